@@ -37,17 +37,13 @@ const QUERY_NS: [f64; 2] = [51.0, 51.0];
 const TREE_NS: [f64; 4] = [1.5, 0.12, 0.15, 0.03];
 /// An item of a scan, in the nearest cache.
 const SCAN_NS: f64 = 0.5;
-/// Items that fit the nearest cache.
-///
-/// Beyond it the time of an item grows with the cube root of their number.
+/// Items that fit the nearest cache; then time grows with the cube root of n.
 const NEAR: f64 = 65_536.0;
 /// An overwritten item, by search: a scan has them in the order of their ids.
 const MOVE_NS: [f64; 2] = [4.0, 8.0];
 /// A refit, and a leaf whose bounds it fits.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
-/// The same of two trees, of a moved item.
-///
-/// One that jumps, as those do that age a tree.
+/// The same of two trees, of a moved item that jumps.
 const PART_NS: f64 = 250.0;
 /// Time of a query of two trees / of one in a new tree, until it is counted.
 const TWO: f64 = 2.0;
