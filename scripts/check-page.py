@@ -3,10 +3,10 @@
 
 usage: check-page.py PAGE.html.. [--shots DIR] [--most-mb N]
 
-For each page, at 390, 1,400 and 1,800 px, light and dark: no error on the console, nothing loaded
+For each page but those of `view`, at 390, 1,400 and 1,800 px, light and dark: no error on the console, nothing loaded
 from elsewhere, nothing wider than the window, every figure has marks, texts of a figure stay on
 the page; first paint within a second, and no more than 2 MB. Filter, sorting and the state in the
-hash of the address work. --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
+hash of the address work. A page of `view` decodes its views, and its keys work. --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
 Standard library only.
 """
 
@@ -105,6 +105,23 @@ USE = """(() => {
   return faults;
 })()"""
 
+# Keys of a page of `view`: what is shown after each.
+KEYS = """(async () => {
+  const now = () => document.getElementById("now").textContent;
+  const press = (key) => document.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  const drawn = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const first = now(), of = first.match(/^view 1 of (\\d+)/);
+  if (!of) return [`the first view is "${first}"`];
+  const faults = [];
+  for (const [key, at] of [["End", of[1]], ["c", of[1]], ["f", of[1]], ["0", of[1]], ["Home", "1"]]) {
+    press(key);
+    await drawn();
+    if (!now().startsWith(`view ${at} of`)) faults.push(`after ${key}: "${now()}"`);
+    if (location.hash.includes("NaN")) faults.push(`after ${key}: ${location.hash}`);
+  }
+  return faults;
+})()"""
+
 # Paper has no use for what is clicked.
 PRINT = """[...document.querySelectorAll("#filter,.t+.copy")].some((item) => getComputedStyle(item).display !== "none")
   ? ["buttons are printed"] : []"""
@@ -188,7 +205,8 @@ class Browser:
         for event in self.events:
             method, params = event.get("method"), event.get("params", {})
             is_error = method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning")
-            if method in kinds or is_error:
+            # WebGL by software speaks of its speed.
+            if (method in kinds or is_error) and params.get("entry", {}).get("source") != "rendering":
                 yield f"console: {json.dumps(params)[:300]}"
 
     def shot(self, file):
@@ -204,6 +222,11 @@ def check(browser, page, shots, most_mb):
     if size > most_mb:
         faults.append(f"{size:.2f} MB; expected at most {most_mb} MB")
     url = page.resolve().as_uri()
+    browser.open(url)
+    browser.show(1400, "light", url)
+    if browser.value("!!document.getElementById('now')"):
+        faults += browser.value(KEYS) + list(browser.complaints())
+        return said(page, size, faults, "a view")
     paints = []
     for width in WIDTHS:
         for scheme in SCHEMES:
@@ -235,7 +258,11 @@ def check(browser, page, shots, most_mb):
     if browser.value("!!document.querySelector('[aria-sort],tr.off')"):
         faults.append("state stays when the hash is emptied")
     figures = browser.value("document.querySelectorAll('svg.plot').length")
-    print(f"{page}: {size:.2f} MB, {figures} figures, first paint {paint:.0f} ms, {len(faults)} faults")
+    return said(page, size, faults, f"{figures} figures, first paint {paint:.0f} ms")
+
+
+def said(page, size, faults, what):
+    print(f"{page}: {size:.2f} MB, {what}, {len(faults)} faults")
     for fault in faults[:40]:
         print(f"  {fault}")
     return not faults

@@ -75,7 +75,12 @@ impl Margin {
             }
         };
         let reach = reach(&near, far.as_ref(), of_scene);
-        let derived = DERIVED * (reach + frame.eye.abs()).element_sum();
+        let mut derived = DERIVED * (reach + frame.eye.abs()).element_sum();
+        if lens.is_orthographic() {
+            // Rays of samples begin at points that are rounded in the world.
+            let eye = zero.iter().sum::<DVec3>() + frame.eye;
+            derived += f64::EPSILON * eye.abs().element_sum();
+        }
         // The planes of a matrix are rounded sums about the exact zero.
         let of_named = lens.matrix().map_or(derived, |_| 0.0);
         Margin {

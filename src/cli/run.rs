@@ -246,10 +246,12 @@ impl<'a> Run<'a> {
         process: u32,
         verdict: &Verdict,
     ) -> Result<()> {
-        for key in keys {
-            if self.stream.has(key, process) {
-                continue;
-            }
+        // A group that cannot be had is not tried again by the processes after this one.
+        let later = process..self.plan.effort.processes;
+        let missed = keys.iter().filter(|key| !self.stream.has(key, process));
+        let missed = missed.flat_map(|key| later.clone().map(move |process| (key, process)));
+        let missed: Vec<_> = missed.filter(|(key, p)| !self.stream.has(key, *p)).collect();
+        for (key, process) in missed {
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);
             let structures = self.plan.structures.iter();

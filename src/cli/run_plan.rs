@@ -99,7 +99,7 @@ pub fn plan_of(
 fn shard(text: &str) -> Result<(usize, usize)> {
     let numbers = text.split_once('/');
     let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    let sound = numbers.filter(|&(i, n)| 1 <= i && i <= n);
+    let sound = numbers.filter(|&(i, n)| 1 <= i && i <= n && !text.contains('+'));
     let expected = "expected i/n with i from 1 to n, such as 2/4";
     sound.with_context(|| format!("--shard is '{text}'; {expected}"))
 }

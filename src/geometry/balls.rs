@@ -19,8 +19,8 @@ pub struct BallBlock {
 #[derive(Clone, Default, Debug)]
 pub struct BallBlocks {
     blocks: Vec<BallBlock>,
-    /// No coordinate of any item is larger.
-    reach: f32,
+    /// No coordinate of any item is larger. Setting a sphere enlarges it.
+    pub reach: f32,
 }
 
 /// The spheres of a structure with the doubt of one query about them.

@@ -70,6 +70,8 @@ pub struct Linear {
     positions: Positions,
     /// Spheres of the items, if they are [spheres](Input::spheres).
     balls: Option<BallBlocks>,
+    /// True if the item that reaches farthest was set since the reach was found.
+    farthest_set: bool,
     workers: Option<Workers>,
 }
 
@@ -96,19 +98,21 @@ impl Linear {
     /// Sets the bounds of the item at a position.
     #[inline(always)]
     fn set(&mut self, position: usize, bounds: &Aabb) {
-        self.boxes.set(position, bounds);
         if let Some(balls) = &mut self.balls {
+            let before = self.boxes.get(position).reach().max_element();
+            self.farthest_set |= before >= balls.reach;
             balls.set(position, bounds);
         }
+        self.boxes.set(position, bounds);
     }
 
     /// Removes the item at a position; the last item takes its place.
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {
             let bounds = self.boxes.get(self.ids.len());
+            self.set(position, &bounds);
             self.boxes.pop();
             if last != id {
-                self.set(position, &bounds);
                 self.ids.set(position, last);
                 self.positions.set(last, position as u32);
             }
@@ -203,6 +207,7 @@ impl RegionIndex for Linear {
         let cubes = || BallBlocks::of(ids.iter().map(|&id| items[id as usize]));
         Ok(Linear {
             balls: input.spheres.then(cubes),
+            farthest_set: false,
             boxes,
             ids: ids[..].into(),
             positions: Positions::default(),
@@ -261,6 +266,12 @@ impl RegionIndex for Linear {
                 }
                 (None, true) => {}
             }
+        }
+        if std::mem::take(&mut self.farthest_set)
+            && let Some(balls) = &mut self.balls
+        {
+            let blocks = self.boxes.blocks().iter().map(BoxBlock::union);
+            balls.reach = blocks.fold(0.0, |reach, b| b.reach().max_element().max(reach));
         }
         true
     }

@@ -253,8 +253,10 @@
     playing = !playing;
     settle();
   };
+  // A camera whose near plane rounds to its eye, seen from afar, has no view of its own.
+  const isSound = () => Number.isFinite(cameras[look.frame].aspect);
   const through = () => {
-    look.through = !look.through;
+    look.through = !look.through && isSound();
     settle();
   };
   const home = () => {
@@ -262,6 +264,7 @@
     settle();
   };
   const go = () => {
+    if (!isSound()) return;
     const { from, corners } = cameras[look.frame];
     const far = corners.reduce((sum, c) => plus(sum, c[1], 1 / 4), [0, 0, 0]);
     const reach = minus(far, from);

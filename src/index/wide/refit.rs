@@ -136,6 +136,9 @@ impl Wide {
             changed = changed_above;
         }
         self.root = self.top();
+        if let Some(balls) = &mut self.balls {
+            balls.reach = self.root.reach().max_element();
+        }
     }
 }
 

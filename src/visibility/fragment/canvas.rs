@@ -146,6 +146,10 @@ impl Screen {
                 add([x / w, y / w], size / w * ROUNDED + AXES);
                 continue;
             }
+            // Perhaps in front of the near plane, but nobody knows where.
+            if w + size * ROUNDED >= self.near {
+                return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+            }
             for (to, &[to_x, to_y, to_w, to_size]) in corners.iter().enumerate() {
                 let size = size.max(to_size);
                 if !is_edge(i, to) || to_w + size * ROUNDED < self.near {

@@ -155,7 +155,7 @@ fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let sides = [low.x, high.x].map(|x| [low.y, high.y].map(|y| side(x, y)));
     let sides = sides.as_flattened();
     // Rounding of the side is below this: |d| and distances are below 2^18.
-    let slack = 1e-9;
+    let slack = 1e-4;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
 }
 
