@@ -250,7 +250,9 @@ impl<'a> Run<'a> {
         let later = process..self.plan.effort.processes;
         let missed = keys.iter().filter(|key| !self.stream.has(key, process));
         let missed = missed.flat_map(|key| later.clone().map(move |process| (key, process)));
-        let missed: Vec<_> = missed.filter(|(key, p)| !self.stream.has(key, *p)).collect();
+        let missed: Vec<_> = missed
+            .filter(|(key, p)| !self.stream.has(key, *p))
+            .collect();
         for (key, process) in missed {
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);
