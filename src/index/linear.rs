@@ -70,8 +70,8 @@ pub struct Linear {
     positions: Positions,
     /// Spheres of the items, if they are [spheres](Input::spheres).
     balls: Option<BallBlocks>,
-    /// True if the item that reaches farthest was set since the reach was found.
-    farthest_set: bool,
+    /// True if the item that reaches farthest has come nearer.
+    is_nearer: bool,
     workers: Option<Workers>,
 }
 
@@ -99,8 +99,9 @@ impl Linear {
     #[inline(always)]
     fn set(&mut self, position: usize, bounds: &Aabb) {
         if let Some(balls) = &mut self.balls {
-            let before = self.boxes.get(position).reach().max_element();
-            self.farthest_set |= before >= balls.reach;
+            let [before, now] =
+                [self.boxes.get(position), *bounds].map(|b| b.reach().max_element());
+            self.is_nearer |= before >= balls.reach && now < before;
             balls.set(position, bounds);
         }
         self.boxes.set(position, bounds);
@@ -110,7 +111,7 @@ impl Linear {
     fn remove(&mut self, position: usize, id: ItemId) {
         if let Some(last) = self.ids.pop() {
             let bounds = self.boxes.get(self.ids.len());
-            self.set(position, &bounds);
+            self.set(position, if last == id { &Aabb::EMPTY } else { &bounds });
             self.boxes.pop();
             if last != id {
                 self.ids.set(position, last);
@@ -207,7 +208,7 @@ impl RegionIndex for Linear {
         let cubes = || BallBlocks::of(ids.iter().map(|&id| items[id as usize]));
         Ok(Linear {
             balls: input.spheres.then(cubes),
-            farthest_set: false,
+            is_nearer: false,
             boxes,
             ids: ids[..].into(),
             positions: Positions::default(),
@@ -246,7 +247,8 @@ impl RegionIndex for Linear {
         self.scan(0..blocks, volume, cx)
     }
 
-    /// O(moved): overwrites their lanes. Items may become or cease to be empty.
+    /// O(moved): overwrites their lanes. Items may become or cease to be empty. A pass over
+    /// all blocks more where the farthest sphere has come nearer.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.positions.prepare(&self.ids, items.len());
         for (i, &id) in moved.iter().enumerate() {
@@ -267,7 +269,7 @@ impl RegionIndex for Linear {
                 (None, true) => {}
             }
         }
-        if std::mem::take(&mut self.farthest_set)
+        if std::mem::take(&mut self.is_nearer)
             && let Some(balls) = &mut self.balls
         {
             let blocks = self.boxes.blocks().iter().map(BoxBlock::union);
@@ -367,6 +369,26 @@ mod tests {
     use crate::geometry::{ConvexVolume, Plane};
     use crate::index::FrustumQuery;
     use glam::Vec3;
+
+    /// Else the sphere test asks the exact test of every item from then on.
+    #[test]
+    fn an_item_that_was_far_once_is_forgotten() {
+        let cube = |at: usize| Aabb::new(Vec3::splat(at as f32), Vec3::splat(at as f32 + 1.0));
+        for count in [1, 40] {
+            let mut items: Vec<Aabb> = (0..count).map(cube).collect();
+            let input = Input::new(&items).spheres(true);
+            let mut scan = Linear::build(&input, &LinearParams::default()).unwrap();
+            let last = count - 1;
+            // There and back, there and removed.
+            for bounds in [cube(1 << 23), items[last], cube(1 << 22), Aabb::EMPTY] {
+                items[last] = bounds;
+                assert!(scan.refit(&items, &[last as ItemId]));
+                let reach = items.iter().map(|b| b.reach().max_element());
+                let reach = reach.fold(0.0, f32::max);
+                assert_eq!(scan.balls.as_ref().unwrap().reach, reach, "{bounds:?}");
+            }
+        }
+    }
 
     #[test]
     fn lanes_behind_the_last_item_are_dropped_however_many_blocks_there_are() {

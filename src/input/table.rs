@@ -86,7 +86,8 @@ impl<'b> TableReader<'b> {
         check_quotes(bytes, delimiter, file)?;
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
-                0 | 1 => "an empty file".to_owned(),
+                0 => "an empty file".to_owned(),
+                1 => "a line of blanks".to_owned(),
                 columns => format!("{} without a name", counted(columns, "column")),
             };
             return Err(table.error(found, "a header line"));

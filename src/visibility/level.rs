@@ -69,7 +69,9 @@ impl Level {
         let is_selected = |(name, _): &(String, usize)| {
             selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected))
         };
-        let Some(own) = maps.iter().position(is_selected) else {
+        let exact = |(name, _): &(String, usize)| selected == Some(&name[..]);
+        let own = maps.iter().position(exact);
+        let Some(own) = own.or_else(|| maps.iter().rposition(is_selected)) else {
             return Ok(alone);
         };
         let load_others = |_| {

@@ -120,6 +120,18 @@ fn rows_with_a_guarantee_keep_it_under_orthographic_cameras() {
     );
     kept("bars.csv", &format!("{BOXES}\n{bars}"), &camera, "320x180");
 
+    // A window so small that the outer rows of rays lie outside of it.
+    let beside = "9999999999996,10000000000000.006,9999999999999,10000000000004,10000000000001.006,\
+        10000000000000\n9999999999996,9999999999994,9999999999991,10000000000004,10000000000006,\
+        9999999999992\n";
+    let window = camera.replace(",10,1,100,", ",0.01,1,100,");
+    kept(
+        "window.csv",
+        &format!("{BOXES}\n{beside}"),
+        &window,
+        "320x180",
+    );
+
     // A direction and a bound whose quotients overflow f32.
     let row = "20,-3,-3,30,3,3\n5,-0.5,-0.5,6,0.5,0.5\n40,-2,-2,41,2,2\n";
     let camera = "0,0,0,1,1e-60,0,0,0,1,10,1,100,1.7777777777777777";

@@ -2,7 +2,7 @@
 //! function moves the items behind its plane to the front of the slice and returns
 //! their number.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::geometry::{Aabb, LANES};
 use crate::index::items::Record;
@@ -101,12 +101,12 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
             *count += 1;
         }
     }
-    // An empty box has no area.
-    let cost = |(bounds, count): (Aabb, usize)| match count {
-        0 => 0.0,
-        _ => bounds.half_area() * count as f32,
+    // An empty box has no area; those of far items are numbers in f64 alone.
+    let cost = |(bounds, count): (Aabb, usize)| {
+        let e = bounds.extent().as_dvec3().max(DVec3::ZERO);
+        (e.x * e.y + e.y * e.z + e.z * e.x) * count as f64
     };
-    let mut best: Option<(f32, usize, usize)> = None;
+    let mut best: Option<(f64, usize, usize)> = None;
     for &k in &usable {
         let with = |(bounds, count): (Aabb, usize), i: usize| {
             (bounds.union(&bins[k][i].0), count + bins[k][i].1)

@@ -232,11 +232,16 @@ impl Splitter for CellSplitter<'_> {
                 counts[self.child(&cell, &record.bounds)] += 1;
             }
             if let Some(only) = counts.iter().position(|&count| count == records.len()) {
-                if only == cells {
+                let centre = |record: &Record| record.bounds.centre();
+                let is_point = records.iter().all(|r| centre(r) == centre(&records[0]));
+                if only == cells || is_point || cell.half == 0.0 {
                     return;
                 }
                 // A level without a choice is no level: on to the one child.
-                cell = self.child_cell(&cell, only);
+                cell = Cell {
+                    level: cell.level,
+                    ..self.child_cell(&cell, only)
+                };
                 continue;
             }
             let mut next = [0; 9];

@@ -73,19 +73,24 @@ impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, T, R
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
+/// In scenes of this reach the crate's builder, whose epsilon is 1e-5, still tells
+/// centres apart.
+const SMALLEST: f32 = 1e-4;
+
 /// Number of shapes above which an update by shapes is slow.
 ///
 /// It takes as long as a build from three eighths moved on, below from three quarters on.
 const LARGE: usize = 10_000;
 
-/// The crate's tree over shapes scaled down, its nodes then fitted to the shapes.
+/// The crate's tree over shapes scaled to a reach of 1,000, its nodes then fitted to them.
 ///
 /// If areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
-fn scaled_tree(shapes: &mut [Shape]) -> Bvh<f32, 3> {
+fn scaled_tree(shapes: &mut [Shape], reach: f32) -> Bvh<f32, 3> {
+    let scale = (1e3 / reach).min(1e38);
     let smaller = |shape: &Shape| {
         let (mut small, b) = (*shape, shape.item.bounds);
-        small.item.bounds = Aabb::new(b.min / LARGEST, b.max / LARGEST);
+        small.item.bounds = Aabb::new(b.min * scale, b.max * scale);
         small
     };
     let mut small: Vec<Shape> = shapes.iter().map(smaller).collect();
@@ -134,9 +139,10 @@ impl BoxTested for PeerBvh {
         let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
         let shapes = items.into_iter().map(|item| Shape { item, node: 0 });
         let mut shapes: Vec<Shape> = shapes.collect();
-        let scaled = scene.reach().max_element() > LARGEST;
+        let reach = scene.reach().max_element();
+        let scaled = !(SMALLEST..=LARGEST).contains(&reach);
         let tree = match scaled {
-            true => scaled_tree(&mut shapes),
+            true => scaled_tree(&mut shapes, reach),
             false => Bvh::build(&mut shapes),
         };
         Ok(PeerBvh {

@@ -14,7 +14,7 @@ use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::{Positions, Record};
 use crate::index::tree::node::Stack;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc, scale_for};
 use crate::query::{Context, ItemId};
 
 /// Parameters: `peer-obvhs:update=move`.
@@ -90,8 +90,20 @@ impl BoxTested for PeerObvhs {
             return Ok(PeerObvhs::default());
         }
         let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let mut bvh = ploc::build(&boxes, BvhBuildParams::medium_build());
+        let scale = scale_for(&boxes);
+        let scaled = |b: &Aabb| Aabb::new(b.min * scale, b.max * scale);
+        let small: Vec<Aabb> = boxes.iter().map(scaled).collect();
+        let mut bvh = ploc::build(&small, BvhBuildParams::medium_build());
         bvh.reorder_in_stack_traversal_order();
+        if scale != 1.0 {
+            for node in bvh.nodes.iter_mut().filter(|node| node.is_leaf()) {
+                let first = node.first_index as usize;
+                let held = &bvh.primitive_indices[first..first + node.prim_count as usize];
+                let all = Aabb::union_of(held.iter().map(|&place| &boxes[place as usize]));
+                node.set_aabb(obvhs::aabb::Aabb::new(all.min.into(), all.max.into()));
+            }
+            bvh.refit_all();
+        }
         // A walk keeps one entry a level; the crate's default is 96.
         bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);
         let single = bvh.nodes.iter().all(|node| node.prim_count <= 1);

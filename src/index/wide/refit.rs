@@ -188,6 +188,8 @@ mod tests {
         for count in [1, 16, 17, 300, 5000] {
             let mut items: Vec<Aabb> = (0..count).map(|_| cube(&mut rng)).collect();
             let mut tree = Wide::build(&Input::new(&items), &Default::default()).unwrap();
+            let input = Input::new(&items).spheres(true);
+            let mut spheres = Wide::build(&input, &Default::default()).unwrap();
             let order = tree.ids.to_vec();
             for round in 0..12 {
                 let some = |_| rng.next_u32() % count as u32;
@@ -198,6 +200,10 @@ mod tests {
                     items[id as usize] = if gone { empty } else { moved };
                 }
                 assert!(tree.refit(&items, &moved));
+                assert!(spheres.refit(&items, &moved));
+                // Spheres that were far once are forgotten.
+                let reach = tree.root.reach().max_element();
+                assert_eq!(spheres.balls.as_ref().unwrap().reach, reach);
                 let held = indexable(&items).unwrap();
                 let sound = |b: &Aabb| if b.is_empty() { Aabb::EMPTY } else { *b };
                 let sound: Vec<Aabb> = items.iter().map(sound).collect();

@@ -63,6 +63,10 @@ fn nothing_is_told_from_columns_without_names() {
             "t.csv, line 2: an empty file; expected a header line",
         ),
         (
+            " \nx\n1\n",
+            "t.csv, line 1: a line of blanks; expected a header line",
+        ),
+        (
             ",,\n1,2,3\n",
             "t.csv, line 1: 3 columns without a name; expected a header line",
         ),

@@ -45,7 +45,9 @@ pub struct DoomMap {
 ///
 /// After linuxdoom 1.10, p_doors.c, EV_VerticalDoor.
 fn is_door(action: u16) -> bool {
-    matches!(action, 1 | 26 | 27 | 28 | 31..=34 | 117 | 118)
+    // Boom's generalized actions (boomref.txt, section 14): 6 and 7 are pushed.
+    let is_pushed = (0x2F80..0x8000).contains(&action) && action & 6 == 6;
+    matches!(action, 1 | 26 | 27 | 28 | 31..=34 | 117 | 118) || is_pushed
 }
 
 /// Tests for an action that moves no sector with its tag.
@@ -128,18 +130,24 @@ impl SectorGround {
     }
 
     /// The sector of a point: what the first linedef towards larger x has on this
-    /// side, of several the first in file order.
-    fn sector_at(&self, p: DVec2) -> Option<RegionId> {
+    /// side, seen a little above the point, of several in one place the first in file order.
+    fn sector_at(&self, mut p: DVec2) -> Option<RegionId> {
+        // Vertices have integer heights: none is missed by the rounding of one.
+        if (p.y - p.y.round()).abs() < 1e-9 {
+            p.y = p.y.round();
+        }
         let ahead = WorldBox::new(p.extend(0.0), DVec3::new(f64::INFINITY, p.y, 0.0));
-        let (mut nearest, mut found) = ((f64::INFINITY, 0), None);
+        let (mut nearest, mut found) = ((f64::INFINITY, 0.0, 0), None);
         self.lines.meeting(&ahead, |id| {
             let line = &self.map.lines[id as usize];
             let [a, b] = line.ends.map(plan);
+            let slope = (b.x - a.x) / (b.y - a.y);
             let x = a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
             let is_crossed = (a.y <= p.y) != (b.y <= p.y);
-            if is_crossed && x >= p.x && (x, id) < nearest {
+            // Where lines begin at one vertex, the least slope is the first above it.
+            if is_crossed && x >= p.x && (x, slope, id) < nearest {
                 // Left of a line that goes up is the side of smaller x.
-                (nearest, found) = ((x, id), line.sectors[usize::from(b.y > a.y)]);
+                (nearest, found) = ((x, slope, id), line.sectors[usize::from(b.y > a.y)]);
             }
         });
         found
@@ -221,5 +229,48 @@ impl Ground for SectorGround {
     /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
     fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
         self.regions_at(b, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+    use std::collections::BTreeSet;
+
+    /// Rooms have their corners, and eyes stand, at integer heights.
+    #[test]
+    fn the_sector_at_the_height_of_a_vertex_is_that_of_a_point_beside_it() {
+        for (name, least) in [("freedm-map12", 2000), ("freedm-map20", 10_000)] {
+            let map = DoomMap::of_scene(&load(name, &Default::default()).unwrap()).unwrap();
+            let ground = SectorGround::new(map.clone());
+            let ends = map.lines.iter().flat_map(|line| line.ends);
+            let (heights, places): (BTreeSet<i32>, BTreeSet<i32>) =
+                ends.map(|[x, y]| (y, x / 32)).unzip();
+            let mut checked = 0;
+            for &y in &heights {
+                for x in places.iter().map(|x| x * 32) {
+                    let p = plan([x, y]);
+                    let about = WorldBox::new((p - 0.01).extend(0.0), (p + 0.01).extend(0.0));
+                    let mut is_clear = true;
+                    let all = |id| is_clear &= !meets(&map.lines[id as usize], &about);
+                    ground.lines.meeting(&about, all);
+                    if is_clear {
+                        let beside = ground.sector_at(p + DVec2::Y * 0.01);
+                        assert_eq!(ground.sector_at(p), beside, "{name} {p}");
+                        let near = ground.sector_at(p + DVec2::Y * 6e-17);
+                        assert_eq!(near, beside, "{name} {p}");
+                        checked += 1;
+                    }
+                }
+            }
+            assert!(checked > least, "{name}: {checked}");
+        }
+    }
+
+    #[test]
+    fn pushed_doors_of_boom_move_the_sector_behind_their_line() {
+        assert!([1, 0x3C06, 0x3C07].into_iter().all(is_door));
+        assert!(![0, 141, 0x3C05, 0x8007].into_iter().any(is_door));
     }
 }
