@@ -267,7 +267,9 @@ impl Splitter for CellSplitter<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{PackedTree, RegionIndex};
+    use crate::geometry::ConvexVolume;
+    use crate::index::{PackedTree, RegionIndex, StructureSpec};
+    use crate::query::QueryCost;
 
     #[test]
     fn the_narrowest_axis_is_left_alone() {
@@ -293,6 +295,28 @@ mod tests {
     fn built(items: &[Aabb]) -> PackedTree {
         let quadtree = Quadtree::build(&Input::new(items), &CellParams::default());
         quadtree.expect("boxes on a grid").tree
+    }
+
+    /// A sky box, a lost projectile: levels without a choice do not use up the depth.
+    #[test]
+    fn an_item_far_away_or_around_all_does_not_spoil_the_tree() {
+        let items = grid([24; 3]);
+        let view = ConvexVolume::of_box(&Aabb::new(Vec3::splat(5.0), Vec3::splat(9.0)));
+        for name in ["octree", "quadtree", "bsp:builder=sah"] {
+            let spec = StructureSpec::parse(name).unwrap();
+            let tested = |items: &[Aabb]| {
+                let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
+                let index = spec.build(Input::new(items)).unwrap();
+                index.query_counted((&view).into(), &mut ids, &mut cost);
+                cost.items_tested
+            };
+            let alone = tested(&items);
+            for (at, size) in [(0.0, 1e12), (1e10, 1.0), (1e25, 1e25)] {
+                let far = Aabb::new(Vec3::splat(at - size), Vec3::splat(at + size));
+                let with = tested(&[&items[..], &[far]].concat());
+                assert!(with <= 3 * alone, "{name}, {far:?}: {alone} to {with}");
+            }
+        }
     }
 
     #[test]
