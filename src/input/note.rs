@@ -46,6 +46,15 @@ pub fn tell_warnings() {
     });
 }
 
+/// Does something whose notes and warnings nobody is told.
+pub(crate) fn unheard<T>(work: impl FnOnce() -> T) -> T {
+    let mut kept = None;
+    listening(|listener| kept = listener.take());
+    let done = work();
+    listening(|listener| *listener = kept);
+    done
+}
+
 /// Does something with a line that is new to the listener.
 fn once(line: String, act: impl FnOnce(&mut Told, String)) {
     listening(|listener| {

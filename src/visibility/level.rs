@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::input::{InputError, is_readable, read_file};
+use crate::input::{InputError, is_readable, read_file, unheard};
 use crate::scene::{ItemKind, LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
 use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
 
@@ -53,9 +53,11 @@ impl Level {
             (false, Some(sample)) => sample.bytes.into(),
             (false, None) => return Ok(alone),
         };
+        // Notes on maps that were not selected are of no interest.
         let decode = |name: &str| {
             let begun = Instant::now();
-            let mut map = read_bytes(&bytes, [file, name], Some(name), options).ok()?;
+            let read = || read_bytes(&bytes, [file, name], Some(name), options).ok();
+            let mut map = unheard(read)?;
             if options.items == ItemKind::Triangles {
                 map = map.by_triangle(options).ok()?;
             }
@@ -148,6 +150,26 @@ mod tests {
         let level = Level::of(&source, &scene, &options).expect("a level");
         let counts = (level.input_count, level.output_count);
         assert_eq!((scene.items.len(), counts), (2, (4, 2)));
+    }
+
+    #[test]
+    fn names_may_differ_by_case_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let rows = |count: usize| "0,0,0,1,1,1\n".repeat(count);
+        let csv = |count| format!("min_x,min_y,min_z,max_x,max_y,max_z\n{}", rows(count));
+        let entries = [("A.csv", csv(1)), ("a.csv", csv(7))];
+        let entries = entries
+            .each_ref()
+            .map(|(name, text)| (*name, text.as_bytes(), 0));
+        let file = folder.path().join("case.zip");
+        std::fs::write(&file, scene::packed(&entries)).expect("written");
+        for (name, items) in [("A.csv", 1), ("a.csv", 7)] {
+            let source = format!("{}#{name}", file.display());
+            let scene = scene::load(&source, &Default::default()).expect("boxes");
+            let level = Level::of(&source, &scene, &Default::default()).expect("a level");
+            assert_eq!((&level.selected[..], level.output_count), (name, items));
+            assert_eq!(scene.items.len(), items);
+        }
     }
 
     #[test]
