@@ -130,14 +130,14 @@ pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
 fn corners(faces: &[PlaneF64]) -> Vec<DVec3> {
     /// How far outside rounding may put a corner.
     const OUTSIDE: f64 = 1e-10;
-    let points = triples(faces).filter_map(meeting_point);
+    let points = triples(faces).filter_map(PlaneF64::meeting_point);
     let within = |p: &DVec3| faces.iter().all(|face| share(face, *p) >= -OUTSIDE);
     points.filter(within).collect()
 }
 
 /// A plane's value at a point as a share of the magnitudes it is the sum of.
 fn share(plane: &PlaneF64, p: DVec3) -> f64 {
-    let size = (plane.normal * p).abs().element_sum() + plane.d.abs();
+    let size = plane.size_at(p);
     match size == 0.0 {
         true => 0.0,
         false => plane.value_at(p) / size,
@@ -146,12 +146,4 @@ fn share(plane: &PlaneF64, p: DVec3) -> f64 {
 
 fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {
     combinations(faces.len()).map(|triple| triple.map(|face| &faces[face]))
-}
-
-/// Intersection of three planes, by Cramer's rule.
-fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
-    let crossed = b.normal.cross(c.normal);
-    let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
-    let point = -sum / a.normal.dot(crossed);
-    point.is_finite().then_some(point)
 }

@@ -126,6 +126,20 @@ impl PlaneF64 {
         PlaneF64::new(self.normal, self.normal.dot(zero) + self.d)
     }
 
+    /// Sum of the magnitudes that the value at a point is made of.
+    #[inline(always)]
+    pub fn size_at(&self, x: DVec3) -> f64 {
+        (self.normal * x).abs().element_sum() + self.d.abs()
+    }
+
+    /// The point that three planes share, by Cramer's rule, rounded.
+    pub fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
+        let crossed = b.normal.cross(c.normal);
+        let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
+        let point = -sum / a.normal.dot(crossed);
+        point.is_finite().then_some(point)
+    }
+
     /// Rounded once to f32.
     pub fn narrow(&self) -> Plane {
         Plane::new(self.normal.as_vec3(), self.d as f32)

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::arithmetic::{Expansion, combinations, two_product, two_sum};
+use crate::geometry::PlaneF64;
 
 /// How exactly to calculate.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -127,13 +128,6 @@ impl Number {
     }
 }
 
-/// A certificate in f64, each coefficient rounded once.
-#[derive(Clone, Debug)]
-pub(super) struct Filter {
-    pub normal: DVec3,
-    d: f64,
-}
-
 /// A certificate in full.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
@@ -161,27 +155,26 @@ impl Corners {
     }
 }
 
-impl Filter {
-    pub fn new(certificate: &HalfSpace) -> Filter {
-        Filter {
-            normal: certificate.normal.each_ref().map(Number::estimate).into(),
-            d: certificate.d.estimate(),
-        }
+impl HalfSpace {
+    /// The filter: a certificate in f64, each coefficient rounded once.
+    pub fn rounded(&self) -> PlaneF64 {
+        let normal = self.normal.each_ref().map(Number::estimate);
+        PlaneF64::new(normal.into(), self.d.estimate())
     }
+}
 
-    /// Value at the p-vertex and a bound of its error.
-    #[inline(always)]
-    pub fn at_p_vertex(&self, b: &Corners) -> (f64, f64) {
-        let looks_up = self.normal.cmpge(DVec3::ZERO);
-        self.at(DVec3::select(looks_up, b.max, b.min))
-    }
+/// Value of a filter at the p-vertex and a bound of its error.
+#[inline(always)]
+pub(super) fn at_p_vertex(filter: &PlaneF64, b: &Corners) -> (f64, f64) {
+    let looks_up = filter.normal.cmpge(DVec3::ZERO);
+    at(filter, DVec3::select(looks_up, b.max, b.min))
+}
 
-    #[inline(always)]
-    pub fn at(&self, point: DVec3) -> (f64, f64) {
-        let along = self.normal * point;
-        let magnitude = along.abs().element_sum() + self.d.abs();
-        (along.element_sum() + self.d, FILTER_ERROR * magnitude)
-    }
+/// Value of a filter at a point and a bound of its error.
+#[inline(always)]
+pub(super) fn at(filter: &PlaneF64, point: DVec3) -> (f64, f64) {
+    let error = FILTER_ERROR * filter.size_at(point);
+    (filter.value_at(point), error)
 }
 
 impl Exact {
@@ -232,15 +225,15 @@ impl Exact {
 
 /// A point inside all faces: the mean of the corners. None without at least
 /// four corners; only a hint, so f64 will do.
-pub(super) fn inner_point(faces: &[Filter]) -> Option<DVec3> {
+pub(super) fn inner_point(faces: &[PlaneF64]) -> Option<DVec3> {
     let mut sum = DVec3::ZERO;
     let mut count = 0.0;
     for triple in combinations(faces.len()) {
-        let Some(corner) = meeting_point(triple.map(|face| &faces[face])) else {
+        let Some(corner) = PlaneF64::meeting_point(triple.map(|face| &faces[face])) else {
             continue;
         };
         let within = faces.iter().all(|face| {
-            let (value, error) = face.at(corner);
+            let (value, error) = at(face, corner);
             value >= -1e6 * error
         });
         if within {
@@ -249,13 +242,4 @@ pub(super) fn inner_point(faces: &[Filter]) -> Option<DVec3> {
         }
     }
     (count >= 4.0).then(|| sum / count)
-}
-
-/// The point that three planes share, by Cramer's rule.
-fn meeting_point(planes: [&Filter; 3]) -> Option<DVec3> {
-    let [a, b, c] = planes.map(|plane| plane.normal);
-    let determinant = a.dot(b.cross(c));
-    let sum = b.cross(c) * planes[0].d + c.cross(a) * planes[1].d + a.cross(b) * planes[2].d;
-    let point = -sum / determinant;
-    point.is_finite().then_some(point)
 }

@@ -9,10 +9,10 @@ mod evaluate;
 mod rough;
 
 use certificates::{Extent, certificates};
-use evaluate::{Corners, Exact, Filter, HalfSpace, Precision, inner_point};
+use evaluate::{Corners, Exact, HalfSpace, Precision, at, at_p_vertex, inner_point};
 use glam::DVec3;
 
-use crate::geometry::{Aabb, ConvexVolume};
+use crate::geometry::{Aabb, ConvexVolume, PlaneF64};
 
 pub use crate::camera::Pose;
 
@@ -67,7 +67,7 @@ pub struct Oracle {
     faces: usize,
     precision: Precision,
     /// The same certificates twice: in f64 for the filter, and in full.
-    filter: Vec<Filter>,
+    filter: Vec<PlaneF64>,
     exact: Vec<Exact>,
     /// A point well inside the volume, to prove overlaps with.
     inner: Option<DVec3>,
@@ -89,7 +89,7 @@ impl Oracle {
         let (extent, [mut all, others]) = certificates(constraints, precision);
         let faces = all.len();
         all.extend(others);
-        let filter: Vec<Filter> = all.iter().map(Filter::new).collect();
+        let filter: Vec<PlaneF64> = all.iter().map(HalfSpace::rounded).collect();
         Oracle {
             extent,
             faces,
@@ -170,7 +170,7 @@ impl Oracle {
         }
         let depths = self.filter.iter().zip(&self.exact).map(|(filter, exact)| {
             let length = filter.normal.length();
-            let (value, error) = filter.at_p_vertex(corners);
+            let (value, error) = at_p_vertex(filter, corners);
             match error > value.abs() * 1e-6 {
                 true => exact.at_p_vertex(corners, self.precision) / length,
                 false => value / length,
@@ -191,7 +191,7 @@ impl Oracle {
     /// does not decide.
     #[inline]
     fn sign(&self, certificate: usize, corners: &Corners) -> i32 {
-        let (value, error) = self.filter[certificate].at_p_vertex(corners);
+        let (value, error) = at_p_vertex(&self.filter[certificate], corners);
         if value > error {
             return 1;
         }
@@ -207,7 +207,7 @@ impl Oracle {
     fn witnessed(&self, b: &Corners) -> bool {
         let is_inside = |point: DVec3| {
             self.filter[..self.faces].iter().all(|face| {
-                let (value, error) = face.at(point);
+                let (value, error) = at(face, point);
                 value > error
             })
         };
