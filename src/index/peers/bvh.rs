@@ -98,22 +98,14 @@ fn scaled_tree(shapes: &mut [Shape], reach: f32) -> Bvh<f32, 3> {
     for (shape, placed) in shapes.iter_mut().zip(&small) {
         shape.node = placed.node;
     }
-    let mut fitted = vec![CrateAabb::empty(); tree.nodes.len()];
     // Children come after their parent.
     for at in (0..tree.nodes.len()).rev() {
-        fitted[at] = match &mut tree.nodes[at] {
-            BvhNode::Leaf { shape_index, .. } => shapes[*shape_index].aabb(),
-            BvhNode::Node {
-                child_l_index,
-                child_l_aabb,
-                child_r_index,
-                child_r_aabb,
-                ..
-            } => {
-                (*child_l_aabb, *child_r_aabb) = (fitted[*child_l_index], fitted[*child_r_index]);
-                child_l_aabb.join(child_r_aabb)
-            }
-        };
+        if !tree.nodes[at].is_leaf() {
+            let children = [tree.nodes[at].child_l(), tree.nodes[at].child_r()];
+            let [left, right] = children.map(|child| tree.nodes[child].get_node_aabb(shapes));
+            *tree.nodes[at].child_l_aabb_mut() = left;
+            *tree.nodes[at].child_r_aabb_mut() = right;
+        }
     }
     tree
 }
