@@ -43,31 +43,29 @@ pub trait BoxTest {
 
 /// A volume with THE plane test in f32 and at most eight planes, all of them at
 /// once. Nodes and items are tested alike.
-pub struct AtOnce(pub PlaneRows);
-
-impl BoxTest for AtOnce {
+impl BoxTest for PlaneRows {
     #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
-        self.0.exclude(node)
+        self.exclude(node)
     }
     #[inline(always)]
     fn accepts(&self, node: &Aabb) -> bool {
-        self.0.contain(node)
+        self.contain(node)
     }
     #[inline(always)]
     fn rejects_accepts(&self, node: &Aabb) -> (bool, bool) {
-        self.0.exclude_contain(node)
+        self.exclude_contain(node)
     }
     #[inline(always)]
     fn admits(&self, item: &Aabb) -> bool {
-        !self.0.exclude(item)
+        !self.exclude(item)
     }
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
-        centre_bounds::of_planes(&self.0, half, scene)
+        centre_bounds::of_planes(self, half, scene)
     }
     #[inline(always)]
     fn planes(&self) -> u32 {
-        self.0.count()
+        self.count()
     }
 }
 
@@ -98,12 +96,10 @@ impl<Q: QueryVolume> BoxTest for PlaneByPlane<'_, Q> {
 }
 
 /// Region search: the boxes that hold a point.
-pub struct Holding(pub Vec3);
-
-impl BoxTest for Holding {
+impl BoxTest for Vec3 {
     #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
-        !node.contains_point(self.0)
+        !node.contains_point(*self)
     }
     #[inline(always)]
     fn accepts(&self, _: &Aabb) -> bool {
@@ -111,10 +107,10 @@ impl BoxTest for Holding {
     }
     #[inline(always)]
     fn admits(&self, item: &Aabb) -> bool {
-        item.contains_point(self.0)
+        item.contains_point(*self)
     }
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
-        centre_bounds::of_point(self.0, half, scene)
+        centre_bounds::of_point(*self, half, scene)
     }
 }
 
@@ -214,13 +210,13 @@ impl<X: BoxTested> RegionIndex for X {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
-            return match volume.as_point().map(Holding) {
-                Some(test) => self.search(&mut BoxQuery { test: &test, cx }),
+            return match &volume.as_point() {
+                Some(test) => self.search(&mut BoxQuery { test, cx }),
                 None => ControlFlow::Continue(()),
             };
         }
-        match volume.rows().map(AtOnce) {
-            Some(test) => self.search(&mut BoxQuery { test: &test, cx }),
+        match &volume.rows() {
+            Some(test) => self.search(&mut BoxQuery { test, cx }),
             None => {
                 let test: &dyn BoxTest = &PlaneByPlane(volume);
                 self.search(&mut BoxQuery { test, cx })
