@@ -82,7 +82,7 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64>
     /// How near to a corner a sum must pass, as a share of the magnitudes
     /// there: far above rounding, far below the gap of a sum that is idle.
     const TIGHT: f64 = 1e-7;
-    let corners = corners(faces);
+    let corners = PlaneF64::corners(faces);
     let mut found: Vec<(f64, PlaneF64)> = Vec::new();
     for [a, b] in combinations(faces.len()).map(|pair| pair.map(|face| &faces[face])) {
         for axis in 0..3 {
@@ -99,7 +99,7 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64>
             if length < CANCELLED {
                 continue;
             }
-            let gaps = corners.iter().map(|&corner| share(&plane, corner));
+            let gaps = corners.iter().map(|&corner| plane.share_at(corner));
             let gap = gaps.fold(f64::INFINITY, f64::min);
             let cost = RESIDUE * (2.0 * reach + of_a.abs() + of_b.abs());
             let d = d + cost / length;
@@ -122,26 +122,8 @@ pub fn extended(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
 
 /// How far the corners of a bounded volume are from the zero.
 pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
-    let lengths = corners(faces).into_iter().map(DVec3::length);
+    let lengths = PlaneF64::corners(faces).into_iter().map(DVec3::length);
     lengths.fold(0.0, f64::max)
-}
-
-/// The corners of a volume, to f64 rounding.
-fn corners(faces: &[PlaneF64]) -> Vec<DVec3> {
-    /// How far outside rounding may put a corner.
-    const OUTSIDE: f64 = 1e-10;
-    let points = triples(faces).filter_map(PlaneF64::meeting_point);
-    let within = |p: &DVec3| faces.iter().all(|face| share(face, *p) >= -OUTSIDE);
-    points.filter(within).collect()
-}
-
-/// A plane's value at a point as a share of the magnitudes it is the sum of.
-fn share(plane: &PlaneF64, p: DVec3) -> f64 {
-    let size = plane.size_at(p);
-    match size == 0.0 {
-        true => 0.0,
-        false => plane.value_at(p) / size,
-    }
 }
 
 fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {

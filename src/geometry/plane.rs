@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::Aabb;
+use crate::arithmetic::combinations;
 
 /// A half-space: the points `x` with `normal . x + d >= 0` (closed).
 ///
@@ -132,8 +133,27 @@ impl PlaneF64 {
         (self.normal * x).abs().element_sum() + self.d.abs()
     }
 
+    /// The value at a point as a share of the magnitudes that it is made of.
+    pub fn share_at(&self, x: DVec3) -> f64 {
+        let size = self.size_at(x);
+        match size == 0.0 {
+            true => 0.0,
+            false => self.value_at(x) / size,
+        }
+    }
+
+    /// The corners of the volume behind all faces, to f64 rounding.
+    pub fn corners(faces: &[PlaneF64]) -> Vec<DVec3> {
+        /// How far outside rounding may put a corner.
+        const OUTSIDE: f64 = 1e-10;
+        let triples = combinations(faces.len()).map(|triple| triple.map(|face| &faces[face]));
+        let within = |p: &DVec3| faces.iter().all(|face| face.share_at(*p) >= -OUTSIDE);
+        let points = triples.filter_map(PlaneF64::meeting_point);
+        points.filter(within).collect()
+    }
+
     /// The point that three planes share, by Cramer's rule, rounded.
-    pub fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
+    fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
         let crossed = b.normal.cross(c.normal);
         let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
         let point = -sum / a.normal.dot(crossed);

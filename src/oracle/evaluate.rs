@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use crate::arithmetic::{Expansion, combinations, two_product, two_sum};
+use crate::arithmetic::{Expansion, two_product, two_sum};
 use crate::geometry::PlaneF64;
 
 /// How exactly to calculate.
@@ -226,20 +226,7 @@ impl Exact {
 /// A point inside all faces: the mean of the corners. None without at least
 /// four corners; only a hint, so f64 will do.
 pub(super) fn inner_point(faces: &[PlaneF64]) -> Option<DVec3> {
-    let mut sum = DVec3::ZERO;
-    let mut count = 0.0;
-    for triple in combinations(faces.len()) {
-        let Some(corner) = PlaneF64::meeting_point(triple.map(|face| &faces[face])) else {
-            continue;
-        };
-        let within = faces.iter().all(|face| {
-            let (value, error) = at(face, corner);
-            value >= -1e6 * error
-        });
-        if within {
-            sum += corner;
-            count += 1.0;
-        }
-    }
-    (count >= 4.0).then(|| sum / count)
+    let corners = PlaneF64::corners(faces);
+    let sum: DVec3 = corners.iter().sum();
+    (corners.len() >= 4).then(|| sum / corners.len() as f64)
 }
