@@ -50,15 +50,12 @@ pub fn read_file(path: &Path) -> Result<Arc<[u8]>> {
         return Ok(bytes.clone());
     }
     let is_file = !is_stdin(path) && fs::metadata(path).map_err(io)?.is_file();
-    let bytes = match is_stdin(path) {
-        true => {
-            let mut bytes = Vec::new();
-            let read = io::stdin().lock().read_to_end(&mut bytes);
-            read.map(|_| bytes)
-        }
-        false => fs::read(path),
+    let mut bytes = Vec::new();
+    let read = match is_stdin(path) {
+        true => io::stdin().lock().read_to_end(&mut bytes).map(drop),
+        false => fs::read(path).map(|read| bytes = read),
     };
-    let bytes = bytes.map_err(io)?;
+    read.map_err(io)?;
     let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(held) = held.as_mut().filter(|_| is_file) {
         hold(held, path, &bytes)?;

@@ -7,7 +7,7 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::place_of;
+use super::{place_of, placed};
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::Record;
@@ -58,17 +58,8 @@ impl BoxTested for PeerBevyStyle {
 
     /// Overwrites the bounds; an entity that is gone is hidden.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let mut held = Vec::with_capacity(moved.len());
-        for &id in moved {
-            let bounds = items[id as usize];
-            match place_of(&self.entities, |e| e.item.id, id) {
-                Ok(at) => held.push((at, bounds)),
-                // An entity that is not held appears. Nothing has changed yet.
-                Err(_) if !bounds.is_empty() => return None,
-                Err(_) => {}
-            }
-        }
-        for (at, bounds) in held {
+        let place = |id| place_of(&self.entities, |e| e.item.id, id);
+        for (at, bounds) in placed(place, items, moved, true)? {
             let entity = &mut self.entities[at];
             entity.item.bounds = bounds;
             entity.inherited_visibility = !bounds.is_empty();

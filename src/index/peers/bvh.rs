@@ -148,8 +148,8 @@ impl BoxTested for PeerBvh {
     ///
     /// A build is faster where most shapes have moved, and needed where areas overflow.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let place = |id| place_of(&self.shapes, |s| s.item.id, id).ok();
-        let placed = placed(place, items, moved)?;
+        let place = |id| place_of(&self.shapes, |s| s.item.id, id);
+        let placed = placed(place, items, moved, false)?;
         let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
         let count = self.shapes.len();
         let eighths = if count > LARGE { 3 } else { 6 };

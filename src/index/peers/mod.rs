@@ -21,26 +21,27 @@ pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
 
 /// Index of an item in a list ascending by id. O(log n), O(1) if no item is empty.
-fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Result<usize, usize> {
+fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Option<usize> {
     match held.get(id as usize) {
-        Some(own) if id_of(own) == id => Ok(id as usize),
-        _ => held.binary_search_by_key(&id, id_of),
+        Some(own) if id_of(own) == id => Some(id as usize),
+        _ => held.binary_search_by_key(&id, id_of).ok(),
     }
 }
 
 /// Moved items by the places that a peer holds them at, with their new bounds.
 ///
-/// Empty items have none; `None` if one becomes or ceases to be empty.
+/// `None` if one ceases to be empty, or becomes so where an empty item keeps no place.
 fn placed(
     place_of: impl Fn(ItemId) -> Option<usize>,
     items: &[Aabb],
     moved: &[ItemId],
+    keeps_empty: bool,
 ) -> Option<Vec<(usize, Aabb)>> {
     let mut placed = Vec::with_capacity(moved.len());
     for &id in moved {
         let bounds = items[id as usize];
         match place_of(id) {
-            Some(at) if !bounds.is_empty() => placed.push((at, bounds)),
+            Some(at) if keeps_empty || !bounds.is_empty() => placed.push((at, bounds)),
             None if bounds.is_empty() => {}
             _ => return None,
         }

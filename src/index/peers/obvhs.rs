@@ -122,7 +122,7 @@ impl BoxTested for PeerObvhs {
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         self.positions.prepare(&self.ids, items.len());
-        let placed = placed(|id| self.positions.of(id), items, moved)?;
+        let placed = placed(|id| self.positions.of(id), items, moved, false)?;
         self.bvh.init_primitives_to_nodes_if_uninit();
         let all = placed.len() * ALL_SHARE >= self.ids.len();
         let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
