@@ -8,14 +8,13 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, bail};
-use indicatif::ProgressBar;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::json;
 
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side};
-use super::processes::{Job, Message, Request, Worker, processors, see_through};
+use super::processes::{Job, Message, Workers};
 use super::run_resume::TypedOptions;
 use super::shared_args::WhatArgs;
 use super::study::progress;
@@ -59,19 +58,18 @@ pub fn compare_against<'a>(
         bail!("'{pipe}' can be read only once; expected a file, which both programs can read");
     }
     interrupt::from_now_on_finish();
-    let bar = progress(0, " pairs");
+    let of_run = arguments(&plan.structures)?;
+    let patience = Duration::from_secs(args.what.timeout);
+    // There are no pipes, and so no folder for them.
+    let workers = || Workers::new(of_run.clone(), patience, Path::new(""));
     let duel = Duel {
         args,
-        of_run: arguments(&plan.structures)?,
         plan: &plan.plan,
-        programs: [binary.to_owned(), new],
-        bar: &bar,
+        sides: [workers()?.of(binary), workers()?.of(&new)],
     };
     // Before it begins: afterwards the load is its own.
     let load = Machine::capture();
-    let found = duel.run();
-    bar.finish_and_clear();
-    let (changes, head) = found?;
+    let (changes, head) = duel.run()?;
     let (busy, cores) = (load.load, load.cores);
     let busy = busy.filter(|busy| is_timed && *busy > 0.5 * cores as f64);
     let note = |busy| {
@@ -191,14 +189,11 @@ fn pairs(args: &CompareArgs) -> (usize, usize) {
 
 /// Two programs, and the plan on which they are compared.
 struct Duel<'a> {
-    /// Gate, threshold and patience.
+    /// Gate and threshold.
     args: &'a CompareArgs,
     plan: &'a Plan,
-    /// The arguments of `run` that the plan follows from.
-    of_run: Vec<String>,
-    programs: [PathBuf; 2],
-    /// Progress bar of the pairs.
-    bar: &'a ProgressBar,
+    /// Workers by the arguments of `run` that the plan follows from.
+    sides: [Workers; 2],
 }
 
 impl Duel<'_> {
@@ -211,8 +206,8 @@ impl Duel<'_> {
     fn run(&self) -> anyhow::Result<(Changes, String)> {
         let started = Instant::now();
         let (first, most) = pairs(self.args);
-        self.bar.set_length(most as u64);
-        self.bar.set_message("counting and checking answers");
+        let bar = progress(most as u64, " pairs");
+        bar.set_message("counting and checking answers");
         let mut seen = self.count()?;
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
         let mut pairs = 0;
@@ -238,8 +233,8 @@ impl Duel<'_> {
                     return Ok((changes, head));
                 }
             }
-            self.bar.set_position(pairs as u64);
-            self.bar.set_message("pairs of processes");
+            bar.set_position(pairs as u64);
+            bar.set_message("pairs of processes");
             for scene in 0..self.plan.scenes.len() {
                 let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;
                 for (seen, own) in seen.iter_mut().zip(both) {
@@ -276,20 +271,18 @@ impl Duel<'_> {
         for scene in 0..self.plan.scenes.len() {
             // The plan is the new side's; the old one keeps to it.
             for side in [NEW, OLD] {
-                let program = &self.programs[side];
                 let mut share = self.share(scene, 0, [&seen[NEW], &[]]);
                 share.plan_only = true;
-                let request = self.request(scene, share, 0);
                 let own = &mut seen[side];
-                let patience = Duration::from_secs(self.args.what.timeout);
                 let mut keep = |said| {
                     if let Message::Part(part, _) = said {
                         own.push(*part);
                     }
                     Ok(())
                 };
-                let ended = see_through(program, &request, patience, &mut keep, &|_| ())?;
-                let named = || program.display().to_string();
+                let workers = &self.sides[side];
+                let ended = workers.see_through(0, job(scene, share), &mut keep, &|_| ())?;
+                let named = || workers.program.display().to_string();
                 ended.done().with_context(named)?;
             }
         }
@@ -313,15 +306,6 @@ impl Duel<'_> {
         }
     }
 
-    fn request(&self, scene: usize, share: Share, layout: u64) -> Request {
-        let job = Job::Scene {
-            scene,
-            share,
-            samples: false,
-        };
-        Request::new(&self.of_run, job, processors().last().copied(), layout)
-    }
-
     /// One pair of processes on one scene, in turns; old and new.
     fn pair(
         &self,
@@ -336,12 +320,12 @@ impl Duel<'_> {
         let first: usize = rng.random_range(0..2);
         let begins: usize = rng.random_range(0..2);
         let mut workers = [None, None];
-        // A side is held for half of the time.
-        let patience = Duration::from_secs(self.args.what.timeout).saturating_mul(2);
         for side in [first, 1 - first] {
             let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
-            let request = self.request(scene, share, rng.random());
-            workers[side] = Some(Worker::start(&self.programs[side], &request, patience)?);
+            let mut worker = self.sides[side].start(0, rng.random(), job(scene, share))?;
+            // A side is held for half of the time.
+            worker.patience = worker.patience.saturating_mul(2);
+            workers[side] = Some(worker);
         }
         let mut turn = 0;
         let other = workers[1 - begins].iter();
@@ -363,7 +347,7 @@ impl Duel<'_> {
                 match worker.listen(Duration::ZERO)? {
                     Some(Ok(Message::Part(part, _))) => parts[side].push(*part),
                     Some(Err(ended)) => {
-                        let program = || self.programs[side].display().to_string();
+                        let program = || self.sides[side].program.display().to_string();
                         ended.done().with_context(program)?;
                         workers[side] = None;
                     }
@@ -373,6 +357,14 @@ impl Duel<'_> {
             }
         }
         Ok(parts)
+    }
+}
+
+fn job(scene: usize, share: Share) -> Job {
+    Job::Scene {
+        scene,
+        share,
+        samples: false,
     }
 }
 

@@ -74,7 +74,7 @@ pub struct Worker {
     /// Since the last message, but for what this process did not run itself (Ctrl-Z).
     waited: Duration,
     looked: Instant,
-    patience: Duration,
+    pub patience: Duration,
 }
 
 impl Worker {
@@ -82,7 +82,7 @@ impl Worker {
     ///
     /// # Errors
     /// The program cannot be started.
-    pub fn start(program: &Path, request: &Request, patience: Duration) -> anyhow::Result<Worker> {
+    fn start(program: &Path, request: &Request, patience: Duration) -> anyhow::Result<Worker> {
         let mut command = Command::new(program);
         // Ctrl-C of a terminal goes to a whole group, and would end a worker that has no
         // handler yet: its cells would have failed for good.
@@ -254,37 +254,9 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     Verdict::new(Status::Panicked, reason)
 }
 
-/// Starts a worker and sees it through.
-///
-/// # Errors
-/// The program cannot be started or is of another version; what `keep` says;
-/// [`interrupt::Interrupted`].
-pub fn see_through(
-    program: &Path,
-    request: &Request,
-    patience: Duration,
-    keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
-    tell: &dyn Fn(&str),
-) -> anyhow::Result<Ended> {
-    let mut worker = Worker::start(program, request, patience)?;
-    loop {
-        interrupt::check()?;
-        let place = || program.display().to_string();
-        match worker.listen(GLANCE).with_context(place)? {
-            Some(Ok(Message::Ready { .. })) => tell("started"),
-            Some(Ok(Message::Doing { structure, step })) => {
-                tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());
-            }
-            Some(Ok(found)) => keep(found)?,
-            Some(Err(ended)) => return Ok(ended),
-            None => {}
-        }
-    }
-}
-
-/// This program, with what all its workers are given.
+/// A program, with what all its workers are given.
 pub struct Workers {
-    program: PathBuf,
+    pub program: PathBuf,
     args: Vec<String>,
     patience: Duration,
     cpus: Vec<usize>,
@@ -294,7 +266,7 @@ pub struct Workers {
 }
 
 impl Workers {
-    /// Files in `folder` stand for pipes.
+    /// Workers of this program; files in `folder` stand for pipes.
     ///
     /// # Errors
     /// Such a file cannot be written.
@@ -320,30 +292,63 @@ impl Workers {
         })
     }
 
+    /// Those of another program, on the last processor.
+    pub fn of(mut self, program: &Path) -> Workers {
+        self.program = program.to_owned();
+        self.cpus.drain(..self.cpus.len().saturating_sub(1));
+        self
+    }
+
+    /// Starts a worker on the next processor; `layout` decides on where its memory lies.
+    ///
+    /// # Errors
+    /// The program cannot be started.
+    pub fn start(&self, process: u32, layout: u64, job: Job) -> anyhow::Result<Worker> {
+        let cpu = process as usize % self.cpus.len().max(1);
+        let request = Request {
+            protocol: PROTOCOL,
+            args: self.args.clone(),
+            spooled: self.spooled.clone(),
+            files: input::held_files(),
+            job,
+            cpu: self.cpus.get(cpu).copied(),
+            layout,
+        };
+        Worker::start(&self.program, &request, self.patience)
+    }
+
     /// Runs a job in a separate process, on the next processor.
     ///
     /// # Errors
-    /// The errors of [`see_through`].
+    /// The program cannot be started or is of another version; what `keep` says;
+    /// [`interrupt::Interrupted`].
     pub fn see_through(
         &self,
         process: u32,
         job: Job,
         keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
-        step: &dyn Fn(&str),
+        tell: &dyn Fn(&str),
     ) -> anyhow::Result<Ended> {
-        let cpu = process as usize % self.cpus.len().max(1);
-        let cpu = self.cpus.get(cpu).copied();
-        let request = Request {
-            spooled: self.spooled.clone(),
-            ..Request::new(&self.args, job, cpu, u64::from(process))
-        };
-        see_through(&self.program, &request, self.patience, keep, step)
+        let mut worker = self.start(process, u64::from(process), job)?;
+        loop {
+            interrupt::check()?;
+            let place = || self.program.display().to_string();
+            match worker.listen(GLANCE).with_context(place)? {
+                Some(Ok(Message::Ready { .. })) => tell("started"),
+                Some(Ok(Message::Doing { structure, step })) => {
+                    tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());
+                }
+                Some(Ok(found)) => keep(found)?,
+                Some(Err(ended)) => return Ok(ended),
+                None => {}
+            }
+        }
     }
 
     /// Runs a job that needs every process; what `pick` takes of its messages.
     ///
     /// # Errors
-    /// The errors of [`see_through`]; a process that does not finish.
+    /// The errors of [`Workers::see_through`]; a process that does not finish.
     pub fn found<T>(
         &self,
         process: u32,
@@ -373,7 +378,7 @@ fn own_program() -> anyhow::Result<PathBuf> {
 }
 
 /// The processors that this process may run on; empty where that is not known.
-pub fn processors() -> Vec<usize> {
+fn processors() -> Vec<usize> {
     #[cfg(target_os = "linux")]
     if let Ok(set) = rustix::thread::sched_getaffinity(None) {
         let all = 0..rustix::thread::CpuSet::MAX_CPU;
@@ -402,21 +407,6 @@ pub struct Request {
     pub cpu: Option<usize>,
     /// Decides on where its memory lies: another number for every process.
     pub layout: u64,
-}
-
-impl Request {
-    /// A job of a command with these arguments; no pipes.
-    pub fn new(args: &[String], job: Job, cpu: Option<usize>, layout: u64) -> Request {
-        Request {
-            protocol: PROTOCOL,
-            args: args.to_vec(),
-            spooled: BTreeMap::new(),
-            files: input::held_files(),
-            job,
-            cpu,
-            layout,
-        }
-    }
 }
 
 /// One process's share of what a command measures.

@@ -205,7 +205,6 @@ impl Study {
             let job = Job::Times(timing);
             all.extend(self.workers.found(process, job, &told, times)?);
         }
-        self.bar.finish_and_clear();
         Ok(all)
     }
 }
