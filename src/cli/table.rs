@@ -1,5 +1,7 @@
 //! A table as rows and columns, and its form on a terminal.
 
+use console::{Alignment, pad_str};
+
 use super::text::{across, plain, wrapped};
 use crate::report::{grouped, unique};
 
@@ -142,17 +144,13 @@ impl Table {
         let widths = self.widths();
         let mut text = String::new();
         for row in std::iter::once(&self.header).chain(&self.rows) {
-            let mut line = String::new();
-            for (column, (cell, width)) in row.iter().zip(&widths).enumerate() {
-                let (cell, gap) = (plain(cell), if column > 0 { GAP } else { 0 });
-                let pad = " ".repeat(width - across(&cell));
-                line += &" ".repeat(gap);
-                line += &match self.right.contains(&column) {
-                    true => pad + &cell,
-                    false => cell + &pad,
-                };
-            }
-            text += line.trim_end();
+            let cells = row.iter().zip(&widths).enumerate();
+            let cells = cells.map(|(column, (cell, width))| {
+                let side = usize::from(self.right.contains(&column));
+                let side = [Alignment::Left, Alignment::Right][side];
+                pad_str(&plain(cell), *width, side, None).into_owned()
+            });
+            text += cells.collect::<Vec<_>>().join(&" ".repeat(GAP)).trim_end();
             text.push('\n');
         }
         text
