@@ -25,7 +25,8 @@ use crate::input::tell_warnings;
 use crate::measure::{SceneInfo, Workload};
 use crate::oracle::Verdict;
 use crate::path::{self, CameraFacts};
-use crate::query::ItemId;
+use crate::query::{ItemId, QueryCost};
+use crate::report::grouped;
 use crate::scene::Scene;
 use crate::verify::Truth;
 use crate::visibility::Rays;
@@ -55,13 +56,13 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         tell(&format!("note: {doubt}"));
     }
     let (mut data, order) = ViewData::of(&scene, &cameras.name);
-    let mut answers: Vec<Box<[ItemId]>> = Vec::new();
+    let (mut answers, mut costs) = (Vec::<Box<[ItemId]>>::new(), Vec::new());
     let (ask, boxes, views) = (frustum(&workload), &workload.items, workload.views.len());
     let bar = progress((views * (structures.len() + 1)) as u64, " views");
     let mut each = |rows: Vec<Row>| {
         bar.inc(rows.len() as u64);
         for row in rows {
-            data.count(&row);
+            costs.push((row.structure, row.cost));
             if answers.len() == row.question {
                 answers.extend(row.ids);
             }
@@ -70,6 +71,8 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     };
     let questions = ("camera", views);
     let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
+    let costs = grouped(costs.into_iter()).into_iter();
+    data.structures = costs.map(Counters::of).collect();
     let threads = args.culling.kernel.execution()?.threads;
     let samples = args.samples;
     let surfaces = samples.map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
@@ -295,7 +298,7 @@ pub struct Frame {
 }
 
 /// Tests that a structure made, per view.
-#[derive(Default, Serialize)]
+#[derive(Serialize)]
 pub struct Counters {
     pub name: String,
     pub nodes_tested: Vec<u64>,
@@ -355,21 +358,16 @@ impl ViewData {
         let order = order.into_iter().map(|(_, item)| item as ItemId);
         (data, order.collect())
     }
+}
 
-    /// Adds the tests of a structure in its next view.
-    pub fn count(&mut self, row: &Row) {
-        let mut known = self.structures.iter();
-        let known = known.position(|own| own.name == row.structure);
-        let at = known.unwrap_or_else(|| {
-            self.structures.push(Counters {
-                name: row.structure.clone(),
-                ..Counters::default()
-            });
-            self.structures.len() - 1
-        });
-        let counters = &mut self.structures[at];
-        counters.nodes_tested.push(row.cost.nodes_tested);
-        counters.items_tested.push(row.cost.items_tested);
+impl Counters {
+    /// Tests by a structure of its name and its costs, view by view.
+    fn of((name, costs): (String, Vec<QueryCost>)) -> Counters {
+        Counters {
+            name,
+            nodes_tested: costs.iter().map(|cost| cost.nodes_tested).collect(),
+            items_tested: costs.iter().map(|cost| cost.items_tested).collect(),
+        }
     }
 }
 
