@@ -119,8 +119,6 @@ pub struct Study {
     bar: ProgressBar,
     /// Text before every step.
     about: String,
-    /// Steps before the processes that take the times.
-    before: u64,
     processes: u32,
 }
 
@@ -141,7 +139,6 @@ impl Study {
             workers: Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())?,
             bar,
             about,
-            before,
             processes,
         })
     }
@@ -163,7 +160,7 @@ impl Study {
         self.bar.set_message(text::plain(&message));
     }
 
-    /// Counts a finished step before the processes.
+    /// Counts a finished step.
     pub fn advance(&self) {
         self.bar.inc(1);
     }
@@ -194,16 +191,13 @@ impl Study {
                 lens_scale,
                 plan: plan.clone(),
             };
-            let told = |_: &str| {
-                self.bar.set_position(self.before + u64::from(process));
-                self.begin(step);
-            };
             let times = |said| match said {
                 Message::Times(times) => Some(times),
                 _ => None,
             };
             let job = Job::Times(timing);
-            all.extend(self.workers.found(process, job, &told, times)?);
+            all.extend((self.workers).found(process, job, &|_| self.begin(step), times)?);
+            self.advance();
         }
         Ok(all)
     }
