@@ -2,7 +2,7 @@
 //!
 //! Parsers of options ([`values`]) check single values; the commands check combinations.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::advise::AdviseOptions;
 use crate::drift::DriftOptions;
@@ -90,6 +90,28 @@ pub enum Command {
     },
     /// Print the licences of the program and of the real scenes inside it
     Licences,
+}
+
+impl Command {
+    /// Refuses standard input, `-`, for two inputs at once.
+    ///
+    /// An output takes or refuses `-` itself.
+    pub fn expect_one_stdin(&self) -> anyhow::Result<()> {
+        let args = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
+        let words = args.collect::<Vec<_>>().join("\n") + "\n";
+        let words = words.replace("=-\n", "\n-\n");
+        let words: Vec<&str> = words.lines().collect();
+        let outputs = ["-o", "--out", "--svg", "--html", "--csv", "--markdown"];
+        let is_input = |pair: &&[&str]| pair[1] == "-" && !outputs.contains(&pair[0]);
+        let inputs = words.windows(2).filter(is_input);
+        let output = match self {
+            Command::Scene(SceneCommand::Convert(args)) => args.output.as_deref(),
+            _ => None,
+        };
+        let count = inputs.count() - usize::from(output == Some(Path::new("-")));
+        anyhow::ensure!(count < 2, "'-' {count} times; expected standard input once");
+        Ok(())
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

@@ -28,7 +28,6 @@ mod history;
 mod interrupt;
 mod list;
 mod merge;
-mod one_stdin;
 mod page;
 mod plan;
 mod precision;
@@ -164,7 +163,8 @@ fn start(registry: Registry) -> ExitCode {
             tell_notes(tell);
         }
     }
-    let ending = one_stdin::one_stdin(&cli.command).and_then(|()| dispatch(&registry, cli.command));
+    let checked = cli.command.expect_one_stdin();
+    let ending = checked.and_then(|()| dispatch(&registry, cli.command));
     if ending.is_ok() {
         tell_warnings();
     }
