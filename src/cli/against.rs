@@ -49,9 +49,9 @@ pub fn compare_against<'a>(
             text::percent(LEAST_THRESHOLD)
         );
     }
-    let new = std::env::current_exe().context("this program cannot be found again")?;
+    let own = std::env::current_exe().context("this program cannot be found again")?;
     let binary = &program(binary)?;
-    let sides = [side(binary)?, side(&new)?];
+    let [old, new] = [side(binary)?, side(&own)?];
     let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
     plan.check_inputs()?;
     if let Some((pipe, _)) = input::pipes().first() {
@@ -65,7 +65,7 @@ pub fn compare_against<'a>(
     let duel = Duel {
         args,
         plan: &plan.plan,
-        sides: [workers()?.of(binary), workers()?.of(&new)],
+        sides: [workers()?.of(binary), workers()?.of(&own)],
     };
     // Before it begins: afterwards the load is its own.
     let load = Machine::capture();
@@ -83,7 +83,6 @@ pub fn compare_against<'a>(
         true => left_out(registry, &args.what, &plan.plan)?,
         false => None,
     };
-    let [old, new] = sides;
     Ok(CompareTable {
         args,
         old,

@@ -27,9 +27,6 @@ use crate::path::DEFAULT_PATH;
 use crate::report::{Line, Report, RunFolder, Stream, comparisons, save_report, utc};
 
 pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
-    if args.plan {
-        return print_plan(registry, args);
-    }
     expect_folder("--out", args.out.as_deref())?;
     let folder = args.save.as_ref().map(|_| Path::new(compare::BASELINES));
     expect_folder("--save", folder)?;
@@ -46,6 +43,9 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     let plan = plan(registry, args)?;
     check_why(args, &plan)?;
     plan.check_inputs()?;
+    if args.plan {
+        return print_plan(&plan.plan);
+    }
     if plan.plan.scenes.is_empty() {
         bail!(
             "nothing to do: this shard has no scene; expected a shard per scene and path at most"
@@ -70,11 +70,9 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
 }
 
 /// The cells as JSON lines, nothing measured.
-fn print_plan(registry: &Registry, args: &RunArgs) -> Result<Ending> {
-    let plan = plan(registry, args)?;
-    plan.check_inputs()?;
+fn print_plan(plan: &Plan) -> Result<Ending> {
     let mut out = io::stdout().lock();
-    for cell in plan.plan.cells() {
+    for cell in plan.cells() {
         writeln!(out, "{}", serde_json::to_string(&cell)?)?;
     }
     out.flush()?;

@@ -259,9 +259,8 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
 /// Meaning of the figures of a [`matrix`].
 pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
     let unit = text::some(overall.base, |base| {
-        let mut about = all.iter().map(|comparison| comparison.about());
-        let moves = about.any(|cell| !cell.path.motion.is_empty());
-        let per = if moves { "frame" } else { "query" };
+        let is_still = all[0].about().path.motion.is_empty();
+        let per = ["frame", "query"][usize::from(is_still)];
         format!("; {base}: time per {per}, others: x {base}")
     });
     format!("* fastest or tied{unit}")
