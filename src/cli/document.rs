@@ -46,8 +46,8 @@ fn markdown_table(table: &Table) -> String {
         let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
-    let is_right = |column| usize::from(table.right.contains(&column));
-    let rule = (0..table.header.len()).map(|column| ["---|", "---:|"][is_right(column)]);
+    let rule = table.right.iter();
+    let rule = rule.map(|right| ["---|", "---:|"][usize::from(*right)]);
     let rule = format!("|{}\n", rule.collect::<String>());
     line(&table.header) + &rule + &table.rows.iter().map(line).collect::<String>()
 }
@@ -58,9 +58,8 @@ fn markdown_table(table: &Table) -> String {
 fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
     // Tables below one heading differ in their first column.
     let caption = text::joined([heading, table.header.first().map_or("", String::as_str)]);
-    let is_right = |column: &usize| table.right.contains(column);
-    let head = table.header.iter().enumerate().map(|(column, name)| {
-        let class = text::some(is_right(&column).then_some(" class=\"n\""), str::to_owned);
+    let head = table.header.iter().zip(&table.right).map(|(name, right)| {
+        let class = if *right { " class=\"n\"" } else { "" };
         format!("<th scope=\"col\"{class}>{}</th>", html(name))
     });
     let of_structures = table.header.first().is_some_and(|name| name == "structure");
@@ -79,7 +78,7 @@ fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
             let text = html(cell);
             match column {
                 0 => format!("<th scope=\"row\">{text}</th>"),
-                n if is_right(&n) => format!("<td class=\"n\"{shade}>{text}</td>"),
+                n if table.right[n] => format!("<td class=\"n\"{shade}>{text}</td>"),
                 _ => format!("<td>{text}</td>"),
             }
         });

@@ -14,18 +14,19 @@ const LEAST_TEXT: usize = 20;
 /// a row.
 pub type Column<R> = (&'static str, fn(&R) -> String);
 
-/// A table whose cells may hold any text. Columns in `right` hold numbers.
+/// A table whose cells may hold any text.
 pub struct Table {
     pub header: Vec<String>,
-    pub right: Vec<usize>,
+    /// True of columns of numbers, whose cells end at the right.
+    pub right: Vec<bool>,
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    pub fn new(header: impl IntoIterator<Item = impl Into<String>>, right: &[usize]) -> Table {
+    fn new(header: Vec<String>, right: Vec<bool>) -> Table {
         Table {
-            header: header.into_iter().map(Into::into).collect(),
-            right: right.to_vec(),
+            header,
+            right,
             rows: Vec::new(),
         }
     }
@@ -33,14 +34,10 @@ impl Table {
     /// A table of heads with bars between them and `>` before those of numbers:
     /// "structure | > query | > build | status".
     pub fn of(columns: &str) -> Table {
-        let mut table = Table::new(columns.split('|').map(str::trim), &[]);
-        for (n, name) in table.header.iter_mut().enumerate() {
-            if let Some(bare) = name.strip_prefix('>') {
-                table.right.push(n);
-                *name = bare.trim_start().to_owned();
-            }
-        }
-        table
+        let heads: Vec<&str> = columns.split('|').map(str::trim).collect();
+        let bare = |head: &&str| head.trim_start_matches('>').trim_start().to_owned();
+        let right = heads.iter().map(|head| head.starts_with('>')).collect();
+        Table::new(heads.iter().map(bare).collect(), right)
     }
 
     /// A row per item.
@@ -73,9 +70,9 @@ impl Table {
 
     /// The first column holds names, all others numbers.
     pub fn of_numbers(header: impl IntoIterator<Item = impl Into<String>>) -> Table {
-        let mut table = Table::new(header, &[]);
-        table.right = (1..table.header.len()).collect();
-        table
+        let header: Vec<String> = header.into_iter().map(Into::into).collect();
+        let right = (0..header.len()).map(|column| column > 0).collect();
+        Table::new(header, right)
     }
 
     pub fn add_row(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
@@ -102,7 +99,8 @@ impl Table {
     /// fit, at least one.
     pub fn parts(&self, width: usize) -> Vec<Table> {
         let widths = self.widths();
-        let names = self.right.iter().min().map_or(1, |first| *first.max(&1));
+        let names = self.right.iter().position(|right| *right);
+        let names = names.map_or(1, |first| first.max(1));
         let name_width: usize = widths.iter().take(names).map(|own| own + GAP).sum();
         let (mut parts, mut left) = (Vec::<Vec<usize>>::new(), 0);
         for (column, own) in widths.iter().enumerate().skip(names) {
@@ -123,10 +121,9 @@ impl Table {
 
     fn of_columns(&self, columns: &[usize]) -> Table {
         let chosen = |row: &Vec<String>| columns.iter().map(|&c| row[c].clone()).collect();
-        let is_right = |&place: &usize| self.right.contains(&columns[place]);
         Table {
             header: chosen(&self.header),
-            right: (0..columns.len()).filter(is_right).collect(),
+            right: columns.iter().map(|&c| self.right[c]).collect(),
             rows: self.rows.iter().map(chosen).collect(),
         }
     }
@@ -144,10 +141,9 @@ impl Table {
         let widths = self.widths();
         let mut text = String::new();
         for row in std::iter::once(&self.header).chain(&self.rows) {
-            let cells = row.iter().zip(&widths).enumerate();
-            let cells = cells.map(|(column, (cell, width))| {
-                let side = usize::from(self.right.contains(&column));
-                let side = [Alignment::Left, Alignment::Right][side];
+            let cells = row.iter().zip(&widths).zip(&self.right);
+            let cells = cells.map(|((cell, width), right)| {
+                let side = [Alignment::Left, Alignment::Right][usize::from(*right)];
                 pad_str(&plain(cell), *width, side, None).into_owned()
             });
             text += cells.collect::<Vec<_>>().join(&" ".repeat(GAP)).trim_end();
@@ -175,14 +171,12 @@ impl Table {
         let widths = self.widths();
         let last = widths.len().checked_sub(1)?;
         let others: usize = widths[..last].iter().map(|own| own + GAP).sum();
-        if others + widths[last] <= width
-            || others + LEAST_TEXT > width
-            || self.right.contains(&last)
-        {
+        let is_text = !self.right[last];
+        if others + widths[last] <= width || others + LEAST_TEXT > width || !is_text {
             return None;
         }
         let room = width - others;
-        let mut table = Table::new(self.header.clone(), &self.right);
+        let mut table = Table::new(self.header.clone(), self.right.clone());
         for row in &self.rows {
             let text: Vec<char> = wrapped(&plain(&row[last]), room).chars().collect();
             // A word may be longer than a line.
@@ -217,11 +211,11 @@ mod tests {
         table.add_row(["b", "", "7"]);
         assert_eq!(
             (&table.right[..], table.header[1].as_str()),
-            (&[1, 2][..], "none")
+            (&[false, true, true][..], "none")
         );
         let kept = table.without_empty_columns();
         assert_eq!(kept.header, ["name", "some"]);
-        assert_eq!(kept.right, [1]);
+        assert_eq!(kept.right, [false, true]);
         assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
     }
 
