@@ -5,7 +5,8 @@
 //!
 //! The crate takes quadratic time where few neighbours agree in a round of clustering,
 //! as in a row of posts or of growing boxes, and where boxes lie in one another. Here
-//! that has a bound; the trees of other scenes are the crate's own.
+//! that has a bound, and one item far away does not take the others' order; the trees
+//! of other scenes are the crate's own.
 
 use glam::DVec3;
 use obvhs::bvh2::Bvh2;
@@ -93,10 +94,14 @@ fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
     tree.children_are_ordered_after_parents = true;
-    let mut clusters = match params.sort_precision {
+    let (mut clusters, ties) = match params.sort_precision {
         SortPrecision::U64 => in_morton_order(boxes, morton_encode_u64_unorm),
         SortPrecision::U128 => in_morton_order(boxes, morton_encode_u128_unorm),
     };
+    // One item far away or around all, such as a sky box, leaves few codes to the others.
+    if ties > boxes.len() / 2 {
+        clusters = in_morton_order(boxes, morton_encode_u128_unorm).0;
+    }
     let (mut next, mut found) = (Vec::with_capacity(clusters.len()), Vec::new());
     let (mut free, mut rounds) = (tree.nodes.len(), 0);
     let mut credit = CREDIT * boxes.len();
@@ -189,8 +194,8 @@ impl<C: RadixKey> RadixKey for Coded<C> {
     }
 }
 
-/// The boxes as leaves, those with the same code in the crate's order.
-fn in_morton_order<C>(boxes: &[Aabb], code: impl Fn(DVec3) -> C) -> Vec<Bvh2Node>
+/// The boxes as leaves, those with the same code in the crate's order, and their number.
+fn in_morton_order<C>(boxes: &[Aabb], code: impl Fn(DVec3) -> C) -> (Vec<Bvh2Node>, usize)
 where
     C: RadixKey + Copy + Ord + Send + Sync,
 {
@@ -207,7 +212,8 @@ where
         _ => order.radix_sort_unstable(),
     }
     let leaf = |at: &Coded<C>| Bvh2Node::new(boxes[at.place as usize].aabb(), 1, at.place as u32);
-    order.iter().map(leaf).collect()
+    let ties = order.windows(2).filter(|two| two[0].code == two[1].code);
+    (order.iter().map(leaf).collect(), ties.count())
 }
 
 /// The preset that was fastest for views and for rays: one item a leaf.
