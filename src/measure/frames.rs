@@ -80,18 +80,13 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     for key in planned.keys.iter().filter(|_| !plan.plan_only) {
         let own = entries.iter().find(|entry| entry.part.label == key.0);
         if let Some(entry) = own.filter(|entry| entry.subject.built.is_ok()) {
-            let timed = entry.timed(key.1, frames);
+            let timed = entry.timed(key.1, workload);
             let tail_of = (key.1 == TaskKind::Frame).then_some(1);
             tasks.push(task_part(key, &timed, &planned.schedule, tail_of));
             // Of one view the queries are the difference of the two.
             let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1)
                 || workload.views_per_frame > 1;
-            let mut kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
-            // Checks go by the right answers; fat bounds return more.
-            let frames = entry.rounds.iter().flatten();
-            for (sample, (_, returned)) in kept.samples.iter_mut().zip(frames) {
-                sample.returned = *returned;
-            }
+            let kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
             samples.push((key.0.clone(), key.1, kept.samples));
         }
     }
@@ -181,16 +176,13 @@ impl Entry<'_> {
     }
 
     /// A sample of a kind of task per frame and round; its ids are those of all views.
-    fn timed(&self, kind: TaskKind, frames: &Frames) -> Result<Timed, Verdict> {
+    fn timed(&self, kind: TaskKind, workload: &Workload) -> Result<Timed, Verdict> {
         if !self.part.verdict.is_ok() {
             return Err(self.part.verdict.clone());
         }
-        let workload = frames.workload;
-        let views = workload.views_per_frame;
         let mut timed = Timed::default();
-        for (round, laps) in (0..).zip(&self.rounds) {
-            let frames = (0..).zip(frames.right.chunks(views)).zip(laps);
-            timed.samples.extend(frames.map(|((frame, answers), own)| {
+        for (round, frames) in (0..).zip(&self.rounds) {
+            timed.samples.extend((0..).zip(frames).map(|(frame, own)| {
                 let [cpu_ns, wall_ns] = times_of(&own.0, kind, workload);
                 Sample {
                     round,
@@ -198,7 +190,7 @@ impl Entry<'_> {
                     queries: 1,
                     cpu_ns,
                     wall_ns,
-                    returned: answers.iter().map(|answer| answer.count).sum(),
+                    returned: own.1,
                 }
             }));
         }

@@ -237,7 +237,6 @@ pub(super) fn task_part(
         rounds_ns: timed.round_means(|s| s.cpu_ns),
         wall_ln_ns: interquartile_mean(&wall.collect::<Vec<_>>()),
         tail_ns: tail_ns.unwrap_or_default(),
-        returned: timed.samples.iter().map(|s| s.returned).sum(),
     }
 }
 

@@ -90,11 +90,6 @@ pub(super) enum Pass {
 impl Pass {
     pub(super) const ALL: [Pass; 2] = [Pass::Queries, Pass::Searches];
 
-    /// The pass that times tasks of this kind.
-    pub(super) fn of(task: TaskKind) -> Pass {
-        Pass::ALL[usize::from(Pass::Searches.tasks().contains(&task))]
-    }
-
     /// The tasks that this pass times in a still scene.
     pub(super) fn tasks(self) -> &'static [TaskKind] {
         match self {

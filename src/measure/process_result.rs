@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use crate::index::{Kind, Origin, StructureSpec};
 
-use super::key::{Pass, TaskKey};
+use super::key::Pass;
 use super::{
-    Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, Subject,
-    TaskKind, Verdict, guarded,
+    Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Subject, TaskKind,
+    Verdict, guarded,
 };
 
 /// Results of one process for one group of cells.
@@ -99,8 +99,6 @@ pub struct TaskPart {
     /// CPU ns per query of groups of cameras that are the same for all tasks,
     /// median over the rounds; empty below twenty of them. Of frames: of each frame.
     pub tail_ns: Vec<f64>,
-    /// Ids returned by all queries.
-    pub returned: u64,
 }
 
 /// Right answers and schedules of the first process, which all others use.
@@ -165,55 +163,6 @@ impl SubjectPart {
             counts: BTreeMap::new(),
             chose: None,
         }
-    }
-}
-
-impl Part {
-    /// Differences of the timed pass from the schedules of the first process, by label.
-    ///
-    /// A task that is not planned or not in its position, too many rounds, samples
-    /// missing or counted twice. The number of ids of a whole pass follows from the
-    /// right answers.
-    pub fn contradictions(&self, known: &Known) -> Vec<(&str, Verdict)> {
-        let mut found = Vec::new();
-        for pass in Pass::ALL {
-            let (Some(KeyedSchedule { keys, schedule }), answers) = known.pass(pass) else {
-                continue;
-            };
-            let cameras = schedule.cameras.iter();
-            let mut counts = cameras.map(|&camera| Some(answers.get(camera as usize)?.count));
-            let one_round = counts.try_fold(0, |sum: u64, count| sum.checked_add(count?));
-            let mut planned = keys.iter().zip(&schedule.tasks);
-            let own = self.tasks.iter().filter(|t| Pass::of(t.task) == pass);
-            for task in own {
-                let is_own = |(label, kind): &TaskKey| *label == task.label && *kind == task.task;
-                let plan = planned.find(|(key, _)| is_own(key)).map(|(_, plan)| plan);
-                let rounds = plan.map(|plan| schedule.rounds.div_ceil(plan.every.max(1)));
-                let ids = |rounds: u32| one_round.and_then(|n| n.checked_mul(rounds.into()));
-                let is_bound = self.bounds.contains(&task.label);
-                let reason = match rounds {
-                    None => "not in its place in the plan of the first process".to_owned(),
-                    Some(_) if !task.verdict.is_ok() => continue,
-                    Some(rounds) if task.rounds_ns.len() > rounds as usize => {
-                        format!("{} rounds; the plan has {rounds}", task.rounds_ns.len())
-                    }
-                    Some(rounds) if !is_bound && ids(rounds) != Some(task.returned) => {
-                        let wanted = ids(rounds);
-                        let wanted = wanted.map_or("other cameras".to_owned(), |n| n.to_string());
-                        let returned = task.returned;
-                        format!("{returned} ids in all its samples; the plan asks for {wanted}")
-                    }
-                    Some(_) => continue,
-                };
-                let reason = format!("process {}, {}: {reason}", self.process, task.task.name());
-                let verdict = Verdict::new(Status::Wrong, reason);
-                found.push((task.label.as_str(), verdict));
-                if plan.is_none() {
-                    break;
-                }
-            }
-        }
-        found
     }
 }
 

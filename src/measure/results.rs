@@ -68,8 +68,6 @@ struct MergedParts<'p> {
     loaded: &'p Part,
     /// Answers and schedules of the first process.
     known: Option<&'p Known>,
-    /// Structures whose timed pass differs from the schedule.
-    contradictions: Vec<(&'p str, Verdict)>,
     /// ln of the CPU ns per query in each process, by label and task.
     ln_ns: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
     /// Label that times are paired with: [`YARDSTICK`], or else the first with times.
@@ -89,17 +87,11 @@ impl<'p> MergedParts<'p> {
         // Tasks without a time in some process cannot be paired.
         let processes = logs.values().map(Vec::len).max().unwrap_or(0);
         logs.retain(|_, own| own.len() == processes);
-        let known = parts.iter().find_map(|part| part.known.as_ref());
-        let contradictions = known.map_or_else(Vec::new, |known| {
-            let of_part = |part: &'p Part| part.contradictions(known);
-            parts.iter().flat_map(of_part).collect()
-        });
         let mut loaded = parts.iter().filter(|part| !part.scene.digest.is_empty());
         let mut merged = MergedParts {
             parts,
             loaded: loaded.next().unwrap_or(&parts[0]),
-            known,
-            contradictions,
+            known: parts.iter().find_map(|part| part.known.as_ref()),
             ln_ns: logs,
             reference: None,
         };
@@ -144,9 +136,7 @@ impl<'p> MergedParts<'p> {
         let own = self.subjects(label).map(|s| &s.verdict);
         let tasks = self.parts.iter().flat_map(|part| &part.tasks);
         let timed = tasks.filter(|t| t.label == label).map(|t| &t.verdict);
-        let contradictions = self.contradictions.iter();
-        let contradicted = contradictions.filter(|c| c.0 == label).map(|c| &c.1);
-        let mut all = own.chain(timed).chain(contradicted);
+        let mut all = own.chain(timed);
         let first = all.clone().next();
         let failed = all.find(|v| !v.is_ok());
         failed.or(first).cloned().unwrap_or_default()
