@@ -230,9 +230,8 @@ fn time(entries: &mut [Entry], frames: &Frames, planned: &KeyedSchedule, plan: &
     for round in 0..planned.schedule.rounds {
         for n in orders.next() {
             let entry = &mut entries[n];
-            let mut tasks = planned.keys.iter().zip(&planned.schedule.tasks);
-            let own = tasks.find(|(key, _)| key.0 == entry.part.label);
-            let is_due = own.is_some_and(|(_, task)| round.is_multiple_of(task.every.max(1)));
+            let own = planned.plan_of(&entry.part.label, TaskKind::Frame);
+            let is_due = own.is_some_and(|task| round.is_multiple_of(task.every.max(1)));
             if !is_due || !entry.part.verdict.is_ok() {
                 continue;
             }

@@ -11,7 +11,7 @@ use super::count::{Counted, MOST_JUDGED, count_pass, judge};
 use super::index_under_test::original;
 use super::key::{GroupKey, Pass, TaskKey};
 use super::process_result::{Known, Measured, Part, SubjectPart, TaskPart};
-use super::schedule::Tasks;
+use super::schedule::scheduled;
 use super::{
     Answer, Judged, KeyedSchedule, Notice, PathInfo, Protocol, SceneInfo, Schedule, Status,
     Subject, TIMING, TaskKind, Timed, TimedTask, Verdict, Workload, guarded, timed,
@@ -125,31 +125,31 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     let mut schedules = [None, None];
     for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
         let (own, cold) = (&answers[pass as usize], plan.protocol.cold);
-        let mut keyed = tasks_of(workload, &entries, (pass, cold), own);
+        let mut asked = tasks_of(workload, &entries, (pass, cold), own);
         if pass == Pass::Queries {
-            bounds = add_bounds(&mut keyed, workload, subjects, &answers[0], plan.bounds);
+            bounds = add_bounds(&mut asked, workload, subjects, &answers[0], plan.bounds);
         }
         let given = plan.known.and_then(|known| known.pass(pass).0);
         let mut protocol = plan.protocol;
         protocol.task_ns *= pass.share();
-        let mut schedule = keyed.schedule(given, workload.views.len(), &protocol);
-        schedule.share_rounds(&keyed.keys);
-        let labels = keyed.keys.iter().map(|(label, _)| label);
+        let (planned, asked) = scheduled(asked, given, workload.views.len(), &protocol);
+        let (keys, schedule) = (&planned.keys, &planned.schedule);
+        let labels = keys.iter().map(|(label, _)| label);
         let structure = |label| (!bounds.contains(label)).then(|| original(label));
         let structures: Vec<Option<&str>> = labels.map(structure).collect();
         let turn = |task: usize| notice(structures[task], TIMING);
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(&keyed.tasks, &schedule, &plan.protocol, &turn),
+            false => timed(&asked, schedule, &plan.protocol, &turn),
         };
-        let alone = keyed.keys.iter().zip(&schedule.tasks);
+        let alone = keys.iter().zip(&schedule.tasks);
         let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
-        for (key, result) in keyed.keys.iter().zip(timed) {
+        for (key, result) in keys.iter().zip(timed) {
             let groups = schedule.cameras.len().div_ceil(largest);
             let has_tail = key.1 == TaskKind::Query && groups >= LEAST_TAIL;
             let largest = has_tail.then_some(largest);
-            tasks.push(task_part(key, &result, &schedule, largest));
+            tasks.push(task_part(key, &result, schedule, largest));
             let mut own = entries.iter_mut().filter(|e| e.part.label == key.0);
             if let (Err(verdict), Some(entry)) = (&result, own.next()) {
                 entry.part.verdict = verdict.clone();
@@ -157,8 +157,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
             let own = result.map(|timed| timed.samples).unwrap_or_default();
             samples.push((key.0.clone(), key.1, own));
         }
-        let keys = keyed.keys;
-        schedules[pass as usize] = Some(KeyedSchedule { keys, schedule });
+        schedules[pass as usize] = Some(planned);
     }
     let part = Part {
         judged,
@@ -176,8 +175,8 @@ fn tasks_of<'a>(
     entries: &[Entry<'a>],
     (pass, cold): (Pass, bool),
     answers: &[Answer],
-) -> Tasks<'a> {
-    let mut keyed = Tasks::default();
+) -> Vec<(TaskKey, TimedTask<'a>)> {
+    let mut tasks = Vec::new();
     for &kind in pass.tasks() {
         for entry in entries.iter().filter(|entry| entry.part.verdict.is_ok()) {
             let Ok(built) = &entry.subject.built else {
@@ -192,15 +191,15 @@ fn tasks_of<'a>(
                 continue;
             }
             let task = TimedTask::of(kind, spec, workload, built, answers, least_ns);
-            keyed.push((entry.subject.label(), kind), task);
+            tasks.push(((entry.subject.label(), kind), task));
         }
     }
-    keyed
+    tasks
 }
 
 /// Adds the lower bounds that apply to the workload, and returns their names.
 fn add_bounds(
-    keyed: &mut Tasks,
+    tasks: &mut Vec<(TaskKey, TimedTask)>,
     workload: &Workload,
     subjects: &[Subject],
     visible: &[Answer],
@@ -213,7 +212,7 @@ fn add_bounds(
     for bound in bounds.iter().filter(|_| !visible.is_empty()) {
         if let Some(task) = (bound.make)(workload, kernel, &visible) {
             names.push(bound.name.to_owned());
-            keyed.push((bound.name.to_owned(), TaskKind::Query), task);
+            tasks.push(((bound.name.to_owned(), TaskKind::Query), task));
         }
     }
     names

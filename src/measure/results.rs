@@ -12,7 +12,7 @@ use super::group::LEAST_TAIL;
 use super::index_under_test::{MOST_UPDATED, TWIN};
 use super::metrics::{METRICS, MetricInfo, Of};
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
-use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKey, TaskKind, Verdict};
+use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, Verdict};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
@@ -237,8 +237,7 @@ impl<'p> MergedParts<'p> {
     fn times(&self, label: &str) -> CellTimes {
         let planned = self.known.and_then(|known| known.query.as_ref());
         let planned = planned.and_then(|plan| {
-            let own = |key: &TaskKey| key.0 == label && key.1 == TaskKind::Query;
-            let task = plan.schedule.tasks.get(plan.keys.iter().position(own)?)?;
+            let task = plan.plan_of(label, TaskKind::Query)?;
             Some((task.batch as usize, plan.schedule.cameras.len()))
         });
         let (batch, cameras_timed) = planned.unwrap_or_default();

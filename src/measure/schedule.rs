@@ -1,7 +1,7 @@
 //! Schedule of a timed pass: cameras, queries per clock reading, order of tasks.
 //!
 //! The first process of a run makes it from a [`Protocol`]; all others use the same one, and
-//! so do both sides of a comparison. Tasks have keys ([`Tasks`]): times are found by key,
+//! so do both sides of a comparison. Tasks have keys ([`TaskKey`]): times are found by key,
 //! never by position. Orders ([`Orders`]) are balanced, so that neither a position nor a
 //! neighbour favours a task.
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::clock::Stopwatch;
 use super::guarded;
 use super::index_under_test::original;
-use super::key::TaskKey;
+use super::key::{TaskKey, TaskKind};
 use super::task::TimedTask;
 use crate::path::evenly;
 use crate::query::ItemId;
@@ -183,15 +183,6 @@ fn batch(query_ns: f64, cameras: usize) -> usize {
     (needed.max(1.0) as usize).next_power_of_two().min(cameras)
 }
 
-/// Tasks of one timed pass and their keys, in the order in which they are pushed.
-#[derive(Default)]
-pub(super) struct Tasks<'a> {
-    /// Keys in the order of the tasks.
-    pub keys: Vec<TaskKey>,
-    /// The tasks, as [`Schedule::new`] and [`timed`](super::timed) take them.
-    pub tasks: Vec<TimedTask<'a>>,
-}
-
 /// A schedule with the keys of its tasks.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct KeyedSchedule {
@@ -202,38 +193,36 @@ pub struct KeyedSchedule {
     pub schedule: Schedule,
 }
 
-impl<'a> Tasks<'a> {
-    /// Adds a task.
-    pub fn push(&mut self, key: TaskKey, task: TimedTask<'a>) {
-        debug_assert!(!self.keys.contains(&key), "each key once");
-        self.keys.push(key);
-        self.tasks.push(task);
+impl KeyedSchedule {
+    /// The plan of a task, if it has one.
+    pub(super) fn plan_of(&self, label: &str, kind: TaskKind) -> Option<TaskPlan> {
+        let mut keys = self.keys.iter();
+        let position = keys.position(|key| key.0 == label && key.1 == kind)?;
+        self.schedule.tasks.get(position).copied()
     }
+}
 
-    /// Makes the schedule of the tasks for `cameras` cameras.
-    ///
-    /// With a `given` schedule, returns its part for these tasks and drops the tasks
-    /// that it does not have.
-    pub fn schedule(
-        &mut self,
-        given: Option<&KeyedSchedule>,
-        cameras: usize,
-        protocol: &Protocol,
-    ) -> Schedule {
-        let Some(given) = given else {
-            return Schedule::new(cameras, &self.tasks, protocol);
-        };
-        let mut schedule = given.schedule.clone();
-        let planned = std::mem::take(&mut schedule.tasks);
-        let Tasks { keys, tasks } = std::mem::take(self);
-        for (key, task) in keys.into_iter().zip(tasks) {
-            if let Some(position) = given.keys.iter().position(|planned| *planned == key) {
-                schedule.tasks.push(planned[position]);
-                self.push(key, task);
-            }
-        }
-        schedule
-    }
+/// The schedule of a timed pass for `cameras` cameras, and the tasks that take part.
+///
+/// With a `given` schedule it is the part for these tasks, without those that it does not have.
+pub(super) fn scheduled<'a>(
+    mut tasks: Vec<(TaskKey, TimedTask<'a>)>,
+    given: Option<&KeyedSchedule>,
+    cameras: usize,
+    protocol: &Protocol,
+) -> (KeyedSchedule, Vec<TimedTask<'a>>) {
+    let plan = |(label, kind): &TaskKey| given?.plan_of(label, *kind);
+    tasks.retain(|(key, _)| given.is_none() || plan(key).is_some());
+    let (keys, tasks): (Vec<_>, Vec<_>) = tasks.into_iter().unzip();
+    let mut schedule = match given {
+        None => Schedule::new(cameras, &tasks, protocol),
+        Some(given) => Schedule {
+            tasks: keys.iter().filter_map(plan).collect(),
+            ..given.schedule.clone()
+        },
+    };
+    schedule.share_rounds(&keys);
+    (KeyedSchedule { keys, schedule }, tasks)
 }
 
 /// Balanced orders of n tasks: a Williams square per block of n rounds.
@@ -286,7 +275,6 @@ impl Orders {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::TaskKind;
 
     fn protocol() -> Protocol {
         Protocol {
