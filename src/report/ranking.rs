@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::{Report, ReportCell};
-use crate::measure::{CellTimes, Judged, Metric, Status, YARDSTICK};
+use crate::measure::{CellTimes, GroupKey, Judged, Metric, Status, YARDSTICK};
 use crate::statistics::{ALPHA, Estimate, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
@@ -17,21 +17,13 @@ pub struct Comparison<'r> {
     pub bounds: Vec<&'r ReportCell>,
 }
 
-/// Key of a comparison.
-type Key<'r> = [&'r str; 5];
-
-fn key(cell: &ReportCell) -> Key<'_> {
-    let path = &cell.path;
-    let scene = &cell.scene.name;
-    [scene, &path.name, &path.cache, &cell.test, &path.motion]
-}
-
 /// All comparisons of a report, in the order in which they were measured.
 pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
-    let cells = report.cells.iter().map(|cell| (key(cell), cell));
-    let comparison = |(wanted, cells): (Key<'_>, Vec<_>)| Comparison {
+    let group = |cell: &ReportCell| cell.key().group;
+    let cells = report.cells.iter().map(|cell| (group(cell), cell));
+    let comparison = |(wanted, cells): (GroupKey, Vec<_>)| Comparison {
         cells: ranked(cells),
-        bounds: report.bounds.iter().filter(|b| key(b) == wanted).collect(),
+        bounds: (report.bounds.iter().filter(|b| group(b) == wanted)).collect(),
     };
     grouped(cells).into_iter().map(comparison).collect()
 }
