@@ -174,19 +174,8 @@ pub struct Views {
 /// Times of each reading, by its first view and the number of views.
 type Readings = BTreeMap<(u32, u32), Vec<f64>>;
 
-/// The columns of samples.csv that matter here.
-#[derive(Deserialize)]
-struct SampleRow {
-    scene: String,
-    path: String,
-    cache: String,
-    structure: String,
-    test: String,
-    task: String,
-    frame: u32,
-    queries: u32,
-    cpu_ns: f64,
-}
+/// A row of samples.csv up to the CPU time: six names, then process, round, frame and queries.
+type SampleRow = ([String; 6], [u32; 4], f64);
 
 /// The views of a report in the folder it came from, by the text of their keys.
 ///
@@ -199,20 +188,11 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
     let mut cells: BTreeMap<[String; 6], Readings> = BTreeMap::new();
     let samples = csv::Reader::from_path(folder.join(SAMPLES));
     for row in samples.into_iter().flat_map(csv::Reader::into_deserialize) {
-        let Ok(row): Result<SampleRow, _> = row else {
+        let Ok((names, [_, _, frame, queries], ns)): Result<SampleRow, _> = row else {
             break;
         };
-        let key = [
-            row.scene,
-            row.path,
-            row.cache,
-            row.test,
-            row.structure,
-            row.task,
-        ];
-        let readings = cells.entry(key).or_default();
-        let times = readings.entry((row.frame, row.queries)).or_default();
-        times.push(row.cpu_ns);
+        let readings = cells.entry(names).or_default();
+        readings.entry((frame, queries)).or_default().push(ns);
     }
     let mut all = BTreeMap::new();
     for kept in stream.parts.iter().map(|kept| &kept.part) {
@@ -227,7 +207,7 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
                 true => TaskKind::Query.name(),
                 false => TaskKind::Frame.name(),
             };
-            let names = [&key.scene, &path, &key.cache, &key.test, label, task];
+            let names = [&key.scene, &path, &key.cache, label, &key.test, task];
             let readings = cells.get(&names.map(lines))?;
             let reading = |(&(frame, queries), ns): (&(u32, u32), &Vec<f64>)| {
                 let mut last = frame;
