@@ -69,7 +69,7 @@ fn class_of(share: f64) -> f64 {
 
 /// The surfaces of all comparisons that ranked anything, in the order in which
 /// they were measured.
-pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
+pub fn surfaces<'r>(comparisons: Vec<Comparison<'r>>) -> Vec<Surface<'r>> {
     let places = comparisons.into_iter().filter_map(|comparison| {
         let about = comparison.about();
         let share = 1.0 - comparison.of_any("cull_rate")?;
@@ -87,18 +87,17 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
         };
         Some(((world_of(&about.scene.name), cache, test), place))
     });
-    let surface = |((world, cache, test), places)| Surface {
-        world,
-        cache,
-        test,
-        places,
+    let surface = |((world, cache, test), mut places): (_, Vec<Place<'r>>)| {
+        places.sort_by(|a, b| a.share.total_cmp(&b.share));
+        places.sort_by_key(|place| place.items);
+        Surface {
+            world,
+            cache,
+            test,
+            places,
+        }
     };
-    let mut all: Vec<Surface> = grouped(places).into_iter().map(surface).collect();
-    for surface in &mut all {
-        surface.places.sort_by(|a, b| a.share.total_cmp(&b.share));
-        surface.places.sort_by_key(|place| place.items);
-    }
-    all
+    grouped(places).into_iter().map(surface).collect()
 }
 
 impl<'r> Place<'r> {
@@ -157,14 +156,10 @@ impl Surface<'_> {
     /// A metric of a structure over the sizes, at one class of shares; the first
     /// where several paths fall into it.
     pub fn curve(&self, structure: &str, class: f64, metric: &str) -> Vec<(usize, f64)> {
-        let mut curve: Vec<(usize, f64)> = Vec::new();
-        for place in self.places.iter().filter(|p| p.class == class) {
-            let value = place.cell(structure).and_then(|cell| cell.value(metric));
-            let is_new = curve.last().is_none_or(|last| last.0 != place.items);
-            if let Some(value) = value.filter(|v| *v > 0.0 && is_new) {
-                curve.push((place.items, value));
-            }
-        }
+        let places = self.places.iter().filter(|place| place.class == class);
+        let points = places.filter_map(|p| Some((p.items, p.cell(structure)?.value(metric)?)));
+        let mut curve: Vec<(usize, f64)> = points.filter(|point| point.1 > 0.0).collect();
+        curve.dedup_by_key(|point| point.0);
         curve
     }
 
