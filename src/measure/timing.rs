@@ -45,14 +45,10 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// The samples of each round that the task took part in.
-    pub fn rounds(&self) -> impl Iterator<Item = &[Sample]> {
-        self.samples.chunk_by(|a, b| a.round == b.round)
-    }
-
-    /// Mean time per query of each round, by one of the clocks, ns.
+    /// Mean time per query of each round that the task took part in, by one of the clocks, ns.
     pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
-        let means = self.rounds().map(|round| {
+        let rounds = self.samples.chunk_by(|a, b| a.round == b.round);
+        let means = rounds.map(|round| {
             let queries: f64 = round.iter().map(|s| f64::from(s.queries)).sum();
             let spent: f64 = round.iter().map(|s| clock(s) * f64::from(s.queries)).sum();
             spent / queries
@@ -293,7 +289,7 @@ mod tests {
             let protocol = Protocol { cold, ..protocol() };
             for timed in timed_rounds(40, &all, &protocol) {
                 let timed = timed.unwrap();
-                assert_eq!(timed.rounds().count(), 3);
+                assert_eq!(timed.round_means(|s| s.cpu_ns).len(), 3);
                 for round in 0..3 {
                     let samples = timed.samples.iter().filter(|s| s.round == round);
                     let asked: u32 = samples.map(|s| s.queries).sum();
@@ -332,7 +328,7 @@ mod tests {
         schedule.rounds = 6;
         schedule.tasks[1].every = 3;
         let found = timed(&all, &schedule, &protocol(), &|_| ());
-        let rounds = |i: usize| found[i].as_ref().unwrap().rounds().count();
+        let rounds = |i: usize| found[i].as_ref().unwrap().round_means(|s| s.cpu_ns).len();
         assert_eq!((rounds(0), rounds(1)), (6, 2));
     }
 
@@ -357,7 +353,10 @@ mod tests {
         for at in [39, 0] {
             let all = [panics(40), panics(at)];
             let found = timed_rounds(40, &all, &protocol());
-            assert_eq!(found[0].as_ref().unwrap().rounds().count(), 3);
+            assert_eq!(
+                found[0].as_ref().unwrap().round_means(|s| s.cpu_ns).len(),
+                3
+            );
             let verdict = found[1].as_ref().unwrap_err();
             assert_eq!(verdict.status, Status::Panicked);
             let reason = verdict.reason.as_deref().unwrap_or_default();
