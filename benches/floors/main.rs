@@ -277,7 +277,7 @@ fn main() -> ExitCode {
         let ratio = query_ns(&group.cells[0]) / query_ns(&group.cells[1]);
         let noise = group
             .twin
-            .map_or(f64::NAN, |(_, ratio)| (ratio.value - 1.0).abs() * 100.0);
+            .map_or(f64::NAN, |twin| (twin.ratio - 1.0).abs() * 100.0);
         let holds = only_test || ratio >= row.floor;
         missed += u32::from(!holds);
         println!(

@@ -185,7 +185,7 @@ fn heat(entered: Vec<Subject>, workload: &Workload) -> (Vec<Subject>, Vec<Subjec
 fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     let cell = |name: &str| group.cells.iter().find(|c| c.structure == name);
     let noise = group.twin.as_ref();
-    let noise = noise.map_or(f64::NAN, |(_, ratio)| (ratio.value - 1.0).abs() * 100.0);
+    let noise = noise.map_or(f64::NAN, |twin| (twin.ratio - 1.0).abs() * 100.0);
     println!("  {SUBJECT} entered twice differs by {noise:.1} %");
     for c in &group.cells {
         if c.status != Status::Ok {

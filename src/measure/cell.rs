@@ -127,6 +127,41 @@ impl Metric {
     }
 }
 
+/// A structure that was entered twice, with what its two times say.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct TwinEntry {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the path.
+    pub path: String,
+    /// File name or spec of the motion; absent for a still scene.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub motion: String,
+    /// "warm" or "cold".
+    pub cache: String,
+    /// Label of the structure.
+    pub structure: String,
+    /// Name of the culling test.
+    pub test: String,
+    /// Time of the second entry / time of the first.
+    pub ratio: f64,
+    /// Lower end of the ratio's 95 % interval.
+    #[serde(default)]
+    pub lower: Option<f64>,
+    /// Upper end of the ratio's 95 % interval.
+    #[serde(default)]
+    pub upper: Option<f64>,
+}
+
+impl TwinEntry {
+    /// True if the interval contains 1; `None` without one.
+    pub fn holds_one(&self) -> Option<bool> {
+        Some(self.lower? <= 1.0 && 1.0 <= self.upper?)
+    }
+}
+
 impl ReportCell {
     /// The key by which another report is searched for the same cell.
     pub fn key(&self) -> CellKey {

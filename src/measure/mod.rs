@@ -60,7 +60,7 @@ use crate::query::{AnyVolume, ItemId};
 use crate::verify::{Fault, Trial, explain_visibility};
 
 pub use bounds::{BOUNDS, Bound};
-pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo};
+pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo, TwinEntry};
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
 pub(crate) use count::blamed;

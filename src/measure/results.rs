@@ -12,7 +12,7 @@ use super::group::LEAST_TAIL;
 use super::index_under_test::{MOST_UPDATED, TWIN};
 use super::metrics::{METRICS, MetricInfo, Of};
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
-use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, Verdict};
+use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, TwinEntry, Verdict};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
@@ -30,10 +30,8 @@ pub struct Group {
     pub cells: Vec<ReportCell>,
     /// Cells of the lower bounds, which are never ranked.
     pub bounds: Vec<ReportCell>,
-    /// Label of the structure that was measured twice, and time of its twin / its own.
-    ///
-    /// The interval should contain 1.
-    pub twin: Option<(String, Estimate)>,
+    /// The structure that was measured twice; the interval should contain 1.
+    pub twin: Option<TwinEntry>,
 }
 
 impl Group {
@@ -374,10 +372,21 @@ impl<'p> MergedParts<'p> {
         ratio(reference, own, self.ln_ns(other, self.ranked())?)
     }
 
-    fn twin(&self) -> Option<(String, Estimate)> {
+    fn twin(&self) -> Option<TwinEntry> {
         let mut labels = self.parts[0].subjects.iter().map(|s| s.label.as_str());
         let (twin, original) = labels.find_map(|l| Some((l, l.strip_suffix(TWIN)?)))?;
-        Some((original.to_owned(), self.ratio(twin, original)?))
+        let (ratio, key) = (self.ratio(twin, original)?, self.parts[0].key.clone());
+        Some(TwinEntry {
+            scene: key.scene,
+            path: key.path,
+            motion: key.motion,
+            cache: key.cache,
+            structure: original.to_owned(),
+            test: key.test,
+            ratio: ratio.value,
+            lower: ratio.lower,
+            upper: ratio.upper,
+        })
     }
 
     /// Index and rank of each ok cell that has times.

@@ -14,7 +14,7 @@ mod stream;
 mod surface;
 mod writing;
 
-pub use crate::measure::{ReportCell, SamplesRef};
+pub use crate::measure::{ReportCell, SamplesRef, TwinEntry};
 pub use changes::{Basis, FEW_OTHERS, Setting, changes, settings};
 pub use experiment::Experiment;
 pub use folder::{RunFolder, StoppedRun, save_page, save_report};
@@ -22,7 +22,7 @@ pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
 };
 pub use merge::{Merged, merge};
-pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
+pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION};
 pub use ranking::{Comparison, Mean, Overall, comparisons, times_as_fast};
 pub use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, read_report, read_stream, views};

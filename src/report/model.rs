@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::measure::{Machine, PathInfo, ReportCell, Source, Status, Toolchain};
-use crate::statistics::{Estimate, geometric_mean};
+use crate::measure::{Machine, ReportCell, Source, Status, Toolchain, TwinEntry};
 
 /// Raised when a field changes its meaning or goes away.
 pub const SCHEMA_VERSION: u32 = 2;
@@ -103,61 +102,6 @@ pub struct Noise {
     /// Causes of noisy times, as far as the run noticed them, with advice.
     #[serde(default)]
     pub warnings: Vec<String>,
-}
-
-/// A structure that was entered twice, with what its two times say.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub struct TwinEntry {
-    /// Name of the scene.
-    pub scene: String,
-    /// Name of the path.
-    pub path: String,
-    /// File name or spec of the motion; absent for a still scene.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub motion: String,
-    /// "warm" or "cold".
-    pub cache: String,
-    /// Label of the structure.
-    pub structure: String,
-    /// Name of the culling test.
-    pub test: String,
-    /// Time of the second entry / time of the first.
-    pub ratio: f64,
-    /// Lower end of the ratio's 95 % interval.
-    #[serde(default)]
-    pub lower: Option<f64>,
-    /// Upper end of the ratio's 95 % interval.
-    #[serde(default)]
-    pub upper: Option<f64>,
-}
-
-impl TwinEntry {
-    /// True if the interval contains 1; `None` without one.
-    pub fn holds_one(&self) -> Option<bool> {
-        Some(self.lower? <= 1.0 && 1.0 <= self.upper?)
-    }
-}
-
-impl Noise {
-    /// Adds a twin and brings the mean ratio up to date.
-    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &(String, Estimate)) {
-        let (structure, ratio) = twin;
-        self.twins.push(TwinEntry {
-            scene: scene.to_owned(),
-            path: path.name.clone(),
-            motion: path.motion.clone(),
-            cache: path.cache.clone(),
-            structure: structure.clone(),
-            test: test.to_owned(),
-            ratio: ratio.value,
-            lower: ratio.lower,
-            upper: ratio.upper,
-        });
-        let ratios: Vec<f64> = self.twins.iter().map(|t| t.ratio).collect();
-        self.aa_ratio = geometric_mean(&ratios);
-    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use super::{Noise, Report, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
 use crate::shown::counted;
-use crate::statistics::two_speeds;
+use crate::statistics::{geometric_mean, two_speeds};
 
 /// A line of stream.jsonl.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -240,13 +240,11 @@ impl Stream {
         for key in &header.groups {
             let kept = self.of_group(key);
             let parts: Vec<Part> = kept.iter().map(|kept| kept.part.clone()).collect();
-            let Some(first) = parts.first().filter(|part| part.process == 0) else {
+            if parts.first().is_none_or(|part| part.process != 0) {
                 continue;
-            };
-            let mut group = Group::of(&parts);
-            if let Some(twin) = &group.twin {
-                report.noise.add(&key.scene, &first.path, &key.test, twin);
             }
+            let mut group = Group::of(&parts);
+            report.noise.twins.extend(group.twin);
             for cell in group.cells.iter_mut().chain(&mut group.bounds) {
                 let rows = |kept: &&KeptPart| kept.rows.get(&cell.structure).copied();
                 let rows = kept.iter().filter_map(rows).fold(0, u64::saturating_add);
@@ -260,6 +258,8 @@ impl Stream {
                 speeds.0 += usize::from(two_speeds(&task.rounds_ns).is_some());
             }
         }
+        let twins = report.noise.twins.iter();
+        report.noise.aa_ratio = geometric_mean(&twins.map(|twin| twin.ratio).collect::<Vec<_>>());
         report.noise.warnings = warnings(&report, speeds);
         enter_growths(&mut report);
         report

@@ -100,7 +100,7 @@ fn one_process_has_the_cells_of_the_plan_in_its_order() {
     });
     assert!(found.eq(plan.cells()));
     for (_, group) in &groups {
-        assert!(group.twin.as_ref().is_some_and(|(label, _)| label == "bvh"));
+        assert!(group.twin.as_ref().is_some_and(|t| t.structure == "bvh"));
         for cell in &group.cells {
             assert_eq!(cell.status, super::super::Status::Ok);
         }

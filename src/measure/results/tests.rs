@@ -201,10 +201,12 @@ fn the_twin_is_no_cell_and_its_interval_holds_one() {
         ("fast#twin", TaskKind::Query, &again),
     ]));
     assert_eq!(group.cells.len(), 2);
-    let (label, ratio) = group.twin.unwrap();
-    assert_eq!(label, "fast");
-    assert!(ratio.lower.unwrap() <= 1.0 && 1.0 <= ratio.upper.unwrap());
-    assert!((ratio.value - 1.0).abs() < 0.01, "{ratio:?}");
+    let twin = group.twin.unwrap();
+    assert_eq!(
+        (&twin.structure[..], twin.holds_one()),
+        ("fast", Some(true))
+    );
+    assert!((twin.ratio - 1.0).abs() < 0.01, "{twin:?}");
 }
 
 #[test]
