@@ -2,13 +2,13 @@
 
 use glam::{DVec3, Vec3};
 
-use super::options::{AdviseInput, AdviseOptions, planned};
+use super::options::{AdviseInput, planned};
 use crate::camera::{Camera, PlaneOptions, Surroundings};
-use crate::culling::{CameraView, Culling, CullingTest};
+use crate::culling::{CameraView, Culling, CullingError, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
-use crate::measure::{Workload, WorkloadError, input_for, input_of};
+use crate::measure::{Workload, input_for, input_of};
 use crate::path::{CameraPath, evenly};
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
@@ -26,7 +26,6 @@ pub struct Case<'a> {
     pub index: Box<dyn DynIndex>,
     /// The fastest scan.
     pub scan: StructureSpec,
-    pub options: AdviseOptions,
 }
 
 impl<'a> Case<'a> {
@@ -43,7 +42,6 @@ impl<'a> Case<'a> {
             path: &setting.path,
             spec,
             scan,
-            options: *all.options,
         })
     }
 
@@ -74,22 +72,11 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// The views of the path.
-    pub fn views(&self) -> &[CameraView] {
-        &self.workload.views
-    }
-
     /// The views of the path by another culling.
-    pub fn views_by(&self, culling: &Culling) -> Result<Vec<CameraView>, WorkloadError> {
-        let cameras = self.workload.cameras.iter().enumerate();
-        let views = cameras.map(|(index, camera)| {
-            let view = culling.view(camera, &self.workload.around);
-            view.map_err(|error| WorkloadError {
-                place: self.path.place(index),
-                error,
-            })
-        });
-        views.collect()
+    pub fn views_by(&self, culling: &Culling) -> Result<Vec<CameraView>, CullingError> {
+        let cameras = self.workload.cameras.iter();
+        let view = |camera| culling.view(camera, &self.workload.around);
+        cameras.map(view).collect()
     }
 
     /// The tree over the items as a culling test indexes them.
@@ -99,27 +86,16 @@ impl<'a> Case<'a> {
         self.spec.build(input_for(test, scene, &items))
     }
 
-    /// The depth of a camera's view, or of the scene where that is infinite.
+    /// The depth of a camera's view, at most that of the scene.
     ///
-    /// The distance from the eye for a scene that is a point, and not zero even there.
-    pub fn depth(&self, camera: usize) -> f64 {
-        let camera = self.camera(camera);
+    /// That of the eye for a scene that is a point, and not zero even there.
+    fn depth(&self, camera: &Camera) -> f64 {
         let Scene { bounds, origin, .. } = self.scene();
         let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
         let depths = [high, camera.frame.eye - *origin].map(|end| end.distance(low));
         let depth = depths.into_iter().find(|depth| *depth > 0.0);
-        camera.lens.far().or(depth).unwrap_or(1.0)
-    }
-
-    /// A camera without its far plane, if that is far beyond all items.
-    fn camera(&self, index: usize) -> Camera {
-        let Camera { frame, lens } = self.workload.cameras[index];
-        let bounds = self.scene().world_bounds();
-        let reach = frame.eye.distance(bounds.min) + bounds.min.distance(bounds.max);
-        let is_idle = lens.far().is_some_and(|far| far > 2.0 * reach);
-        let open = is_idle.then(|| lens.with_far(None).ok()).flatten();
-        let lens = open.unwrap_or(lens);
-        Camera { frame, lens }
+        let depths = camera.lens.far().into_iter().chain(depth);
+        depths.reduce(f64::min).unwrap_or(1.0)
     }
 
     /// Outward displacement of planes for rounding about an origin, in depths.
@@ -127,13 +103,15 @@ impl<'a> Case<'a> {
     /// The largest of all cameras and planes, in depths of the view.
     pub fn margin(&self, around: &Surroundings) -> f64 {
         let options = PlaneOptions::default();
-        let margins = (0..self.workload.cameras.len()).filter_map(|index| {
-            let camera = self.camera(index);
-            let moved = camera.volume(&options, around).ok()?;
-            let derived = camera.volume(&options.without_epsilon(), around).ok()?;
+        let margins = self.workload.cameras.iter().filter_map(|camera| {
+            // A far plane may be far beyond all items.
+            let lens = camera.lens.with_far(None).unwrap_or(camera.lens);
+            let open = Camera { lens, ..*camera };
+            let moved = open.volume(&options, around).ok()?;
+            let derived = open.volume(&options.without_epsilon(), around).ok()?;
             let planes = moved.planes().iter().zip(derived.planes());
             let apart = planes.map(|(a, b)| f64::from(a.d) - f64::from(b.d));
-            Some(apart.fold(0.0, f64::max) / self.depth(index))
+            Some(apart.fold(0.0, f64::max) / self.depth(camera))
         });
         margins.fold(0.0, f64::max)
     }
@@ -171,13 +149,6 @@ mod tests {
             index: spec.build(&scene.items).unwrap(),
             scan: spec.clone(),
             spec,
-            options: AdviseOptions {
-                draw_ns: 1e3,
-                shade_ns: 1.0,
-                tolerance: 1e-5,
-                moved: 0.01,
-                queries_per_update: 1.0,
-            },
         };
         let bytes = |test| case.tree_for(test).unwrap().memory().total();
         // Centre and radius of each item.

@@ -200,7 +200,7 @@ fn share_in_view(known: &Known, items: usize) -> f64 {
 fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
     (1..points.len()).find_map(|n| {
         let (value, there) = *points[n];
-        let first = fastest(there, None);
+        let first = fastest(there);
         let winner = first.first()?;
         let ratio_at = |cells| time_over(cells, taken, &winner.structure);
         if is_longer(ratio_at(there)?) != Some(true) {

@@ -12,27 +12,27 @@ mod rule;
 mod rules;
 mod trials;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 pub use change::{Axis, Beside, Change};
 pub use choice::{StructureChoice, TestChoice, TestRow, ns};
 pub use motion::{MotionChoice, policy_of};
-pub use omission::Check;
-pub use options::{AdviseInput, AdviseOptions};
+pub use omission::{Check, Side};
+pub use options::AdviseInput;
 pub use rule::Omission;
 
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
 use crate::measure::{
-    OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, SharedWork, timed,
+    Answer, OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, timed,
 };
 use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
 use options::planned;
-use rule::{Draft, Facts, Finding, Rule, Unfit};
+use rule::{Draft, Facts, Finding, Rule};
 use rules::RULES;
 use rules::stages;
 use trials::{Answered, BASE, Trials};
@@ -40,18 +40,8 @@ use trials::{Answered, BASE, Trials};
 /// Structure, test and features to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
-    /// Name of the scene.
-    pub scene: String,
-    /// Name of the path.
-    pub path: String,
-    /// Number of items.
-    pub items: usize,
-    /// Number of bad items that were left out on request.
-    pub skipped_items: usize,
-    /// Number of cameras.
-    pub cameras: usize,
-    /// Costs and limits.
-    pub options: AdviseOptions,
+    /// Cost of drawing an item that is not visible, ns.
+    pub draw_ns: f64,
     /// Number of timed processes; an interval needs three or more.
     pub processes: usize,
     /// A/A check: time of the fastest tree, entered a second time, / its own time; the
@@ -63,12 +53,8 @@ pub struct Advice {
     pub test: TestChoice,
     /// One omission per rule.
     pub omissions: Vec<Omission>,
-    /// Warnings about the cameras in the scene.
-    pub warnings: Vec<String>,
     /// Update policy; null for a still scene.
     pub motion: Option<MotionChoice>,
-    /// Gain from threads, where structures were measured with several.
-    pub threads: Vec<SharedWork>,
     /// From which number of items and shares on another structure is faster.
     pub changes: Vec<Change>,
 }
@@ -76,10 +62,9 @@ pub struct Advice {
 impl Advice {
     /// Returns `true` if a structure or a side of a rule gave a wrong answer.
     pub fn found_wrong_answers(&self) -> bool {
-        let structures = self.structure.rows.iter();
-        let omissions = self.omissions.iter().flat_map(|o| &o.checks);
-        structures.into_iter().any(|row| row.status.is_failure())
-            || omissions.into_iter().any(Check::is_wrong)
+        let mut structures = self.structure.rows.iter();
+        structures.any(|row| row.status.is_failure())
+            || self.omissions.iter().any(Omission::is_wrong)
     }
 }
 
@@ -89,8 +74,8 @@ pub struct TrialPlan {
     /// The tree and the scan of the rules.
     structures: [String; 2],
     schedule: Schedule,
-    /// Number of ids, by task and camera.
-    expected: Vec<Vec<u64>>,
+    /// By task and camera.
+    expected: Vec<Vec<Answer>>,
     beside: Beside,
     /// Times of the stages, if the scene and the cameras have such.
     stages: Option<FunnelPlan>,
@@ -102,8 +87,7 @@ pub struct Prepared {
     pub plan: TrialPlan,
     entered: Entered,
     answered: Answered,
-    /// Cells of the run's tasks, and counts of the workloads beside.
-    cells: Vec<ReportCell>,
+    /// Counts of the workloads beside.
     counted: Vec<Part>,
     structure: StructureChoice,
     motion: Option<MotionChoice>,
@@ -124,7 +108,7 @@ pub fn prepare(
     let Setting { scene, path, .. } = input.setting;
     let workload = input.workload()?;
     let structure = StructureChoice::of(&cells);
-    let structures = structure.tree_and_scan();
+    let structures = structure.tree_and_scan_labels();
     let items = scene.items.len() as f64;
     let visible = cells.iter().find_map(|cell| cell.value("visible_count"));
     let moved = workload.motion.as_ref().map(Motion::share);
@@ -136,14 +120,10 @@ pub fn prepare(
     let (beside, counted) = Beside::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
     let mut trials = Trials::new(&case);
-    let mut entered = enter(&mut trials, progress)?;
+    let entered = enter(&mut trials, progress)?;
     progress("answers, checked");
     let answered = trials.answered();
-    let drafts = entered.rules.iter_mut();
-    for sides in drafts.flat_map(|(_, draft)| &mut draft.sides) {
-        trials.compare(sides);
-    }
-    let tasks = trials.tasks(&answered.counts);
+    let tasks = trials.tasks(&answered.answers);
     let tree = planned(&input.setting.structures, &structures[0]);
     let funnel = funnel::prepare(&stages::input(input.setting, &tree), progress);
     let funnel = funnel.map_err(|error| error.to_string());
@@ -151,14 +131,13 @@ pub fn prepare(
         plan: TrialPlan {
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, &input.setting.protocol),
-            expected: answered.counts.clone(),
+            expected: answered.answers.clone(),
             beside,
             stages: funnel.as_ref().ok().map(|prepared| prepared.plan.clone()),
         },
         funnel,
         structure,
         motion,
-        cells,
         counted,
         entered,
         answered,
@@ -170,22 +149,13 @@ pub fn prepare(
 /// # Errors
 /// The errors of [`prepare`], and a scene other than the planned one.
 pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
-    let Setting { path, protocol, .. } = input.setting;
+    let protocol = &input.setting.protocol;
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
     let mut trials = Trials::new(&case);
     enter(&mut trials, &|_| ())?;
-    let (found, ways) = (trials.len(), plan.expected.len());
-    let cameras = plan.expected.iter().map(Vec::len);
-    ensure!(
-        found == ways && cameras.min() == Some(path.cameras.len()),
-        "{found} ways to answer; the plan has {ways}: the scene or the cameras have changed on \
-         the way"
-    );
-    let once_ns = trials.once_ns.clone();
     let tasks = trials.tasks(&plan.expected);
     let mut times = ProcessTimes {
-        once_ns,
         parts: plan.beside.times(input)?,
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
     };
@@ -200,15 +170,14 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
 impl Prepared {
     /// The advice from the times of all processes.
     pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
-        let Setting { scene, path, .. } = input.setting;
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
         let tests = &self.entered.tests;
-        let test = TestChoice::of(tree, input.options.draw_ns, tests, answered, &times);
+        let test = TestChoice::of(tree, input.draw_ns, tests, answered, &times);
         let groups = beside.groups(self.counted, processes);
         // Under further policies the first one is the workload itself.
         let here = groups.first().filter(|_| beside.has_policies());
-        let here = here.map_or(&self.cells, |group| &group.cells);
+        let here = here.map_or(&self.structure.rows, |group| &group.cells);
         let changes = beside.changes(here, &groups);
         // The times of the stages come behind those of the tasks.
         let tasks = self.plan.expected.len();
@@ -218,32 +187,26 @@ impl Prepared {
         });
         let of_stages: Vec<ProcessTimes> = of_stages.collect();
         let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
+        let motion = (self.motion).map(|motion| motion.chosen(&self.structure, here));
         let choices = || Facts {
-            checks: Vec::new(),
-            once_ns: [f64::NAN; 2],
-            once_ratio: None,
+            check: None,
+            draw_ns: input.draw_ns,
             structure: &self.structure,
             test: &test,
+            motion: motion.as_ref(),
             changes: &changes,
             funnel: &funnel,
         };
         let rules = self.entered.rules.into_iter();
         let settled = rules.map(|(rule, draft)| rule.settled(draft, answered, &times, choices()));
         Advice {
-            scene: scene.name.clone(),
-            path: path.name.clone(),
-            items: scene.items.len(),
-            skipped_items: scene.skipped_items,
-            cameras: path.cameras.len(),
-            options: *input.options,
+            draw_ns: input.draw_ns,
             processes: processes.len(),
             twin: times.ratio(self.entered.twin, BASE),
             omissions: settled.collect(),
             test,
-            warnings: path.warnings(scene),
-            motion: (self.motion).map(|motion| motion.chosen(&self.structure, here)),
+            motion,
             structure: self.structure,
-            threads: SharedWork::of(&self.cells),
             changes,
         }
     }
@@ -260,11 +223,10 @@ fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
-        let draft = (rule.prepare)(trials).or_else(|error| {
-            let Unfit(reason) = error.downcast()?;
-            anyhow::Ok(Draft::new(Vec::new(), Finding::none(reason)))
-        });
-        rules.push((rule, draft?));
+        // One that cannot be entered does not apply.
+        let draft = (rule.enter)(trials);
+        let none = |error: anyhow::Error| Draft::new(None, Finding::none(error.to_string()));
+        rules.push((rule, draft.unwrap_or_else(none)));
     }
     Ok(Entered {
         tests: choice::enter_tests(trials)?,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::choice::{StructureChoice, ns, rows};
+use super::choice::{StructureChoice, ns};
 use super::options::AdviseInput;
 use crate::index::UpdatePolicy;
 use crate::measure::ReportCell;
@@ -20,18 +20,11 @@ const RULED_OUT: f64 = 1.5;
 /// The policy to update the structure by.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct MotionChoice {
-    /// The motion: file or spec.
-    pub name: String,
-    /// Share of the items that move in a frame.
-    pub share_moved: f64,
-    /// Queries per frame.
-    pub views: usize,
     /// The fastest policy of the structure that is taken; null without a structure.
     pub policy: Option<String>,
     /// Others that the processes do not tell from it.
     pub policy_ties: Vec<String>,
     /// Measured policies of the structure, fastest first.
-    #[serde(serialize_with = "rows")]
     pub policies: Vec<ReportCell>,
     /// Policies that are not measured, each with the time of its builds per frame, ns.
     pub ruled_out: Vec<(String, f64)>,
@@ -73,9 +66,6 @@ impl MotionChoice {
             }
         }
         let begun = MotionChoice {
-            name: input.motion?.to_owned(),
-            share_moved: motion.share(),
-            views: input.views,
             ruled_out,
             refits,
             ..MotionChoice::default()

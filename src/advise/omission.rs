@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::statistics::{Estimate, flat};
-use crate::verify::ErrorCount;
 
 /// Two times are a tie unless the interval of their ratio lies beyond this.
 ///
@@ -23,24 +22,14 @@ pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
     }
 }
 
-/// Side of its threshold on which a statistic leaves out.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LeftOutIf {
-    /// Not above the threshold.
-    AtMost,
-    /// Not below the threshold.
-    AtLeast,
-}
-
-impl LeftOutIf {
-    /// Returns `true` if a statistic is on this side of a threshold; `None` for NaN.
-    pub(super) fn holds(self, [statistic, threshold]: [f64; 2]) -> Option<bool> {
-        let order = statistic.partial_cmp(&threshold)?;
-        Some(match self {
-            LeftOutIf::AtMost => order.is_le(),
-            LeftOutIf::AtLeast => order.is_ge(),
-        })
+/// Ratio of two costs, each given behind the time in it, from the ratio of these times.
+pub(super) fn of_costs(times: Estimate, own: [f64; 2], other: [f64; 2]) -> Estimate {
+    let ([own_ns, own], [other_ns, other]) = (own, other);
+    let of = |ratio: f64| (ratio * other_ns + own - own_ns) / other;
+    Estimate {
+        value: own / other,
+        lower: times.lower.map(of),
+        upper: times.upper.map(of),
     }
 }
 
@@ -56,12 +45,6 @@ pub enum Decision {
     NotApplicable,
 }
 
-impl Decision {
-    pub(super) fn of(leave_out: bool) -> Decision {
-        [Decision::Keep, Decision::LeaveOut][usize::from(leave_out)]
-    }
-}
-
 /// The judge of a rule.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum By {
@@ -71,15 +54,15 @@ pub(super) enum By {
     Rule,
 }
 
-/// Times and answers with a feature (kept) and without it (left out).
+/// Times and answers with the work of a rule (kept) and without it (left out).
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Check {
     /// The structure or the work that was measured.
     pub on: String,
-    /// Thread CPU time of a camera, mean over cameras and processes, ns.
-    pub kept_ns: f64,
-    /// The same without the feature.
-    pub left_out_ns: f64,
+    /// With the work.
+    pub kept: Side,
+    /// Without it.
+    pub left_out: Side,
     /// Time with it / time without: above 1, leaving out is faster.
     ///
     /// `None` without times.
@@ -87,44 +70,35 @@ pub struct Check {
     pub ratio: Option<Estimate>,
     /// `true` if every camera got the same set from both.
     pub same_answers: bool,
-    /// `true` if both sets must be the same.
-    pub same_expected: bool,
-    /// False positives / visible items; null without a comparison with the truth.
-    pub kept_excess: Option<f64>,
-    /// The same without the feature.
-    pub left_out_excess: Option<f64>,
-    /// Visible items that were not returned, in millionths; null as above.
-    pub kept_false_negative_ppm: Option<f64>,
-    /// The same without the feature.
-    pub left_out_false_negative_ppm: Option<f64>,
-    /// Sums over the cameras that are compared with the truth.
-    #[serde(skip)]
-    pub(super) errors: Option<[ErrorCount; 2]>,
-    /// Number of these cameras.
-    #[serde(skip)]
-    pub(super) judged: usize,
-    /// `true` if leaving out is faster; `None` for a tie.
-    #[serde(skip)]
-    pub(super) pays: Option<bool>,
+}
+
+/// One side of a check; errors are null without a comparison with the truth.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Side {
+    /// Thread CPU time of a camera, mean over cameras and processes, ns.
+    pub ns: f64,
+    /// False positives / visible items.
+    pub excess: Option<f64>,
+    /// Mean of the judged cameras.
+    pub false_positives_per_query: Option<f64>,
+    /// Visible items that were not returned, in millionths.
+    pub false_negative_ppm: Option<f64>,
 }
 
 impl Check {
-    /// Returns `true` if two sides that must answer the same did not.
-    pub fn is_wrong(&self) -> bool {
-        self.same_expected && !self.same_answers
-    }
-
-    /// Returns `true` if the side that leaves out misses more.
-    pub(super) fn loses(&self) -> bool {
-        self.errors
-            .is_some_and(|[kept, left]| left.false_negatives > kept.false_negatives)
-    }
-
-    /// Additional false positives per query without the feature, mean.
-    pub(super) fn more_false_positives(&self) -> Option<f64> {
-        let [kept, left] = self.errors?;
-        let more = left.false_positives as f64 - kept.false_positives as f64;
-        (self.judged > 0).then(|| more / self.judged as f64)
+    /// Times alone, of two sides with the same answers.
+    pub(super) fn of_times(on: String, ns: [f64; 2], ratio: Option<Estimate>) -> Check {
+        let [kept, left_out] = ns.map(|ns| Side {
+            ns,
+            ..Side::default()
+        });
+        Check {
+            on,
+            kept,
+            left_out,
+            ratio,
+            same_answers: true,
+        }
     }
 }
 
@@ -133,83 +107,70 @@ mod tests {
     use super::super::rule::{Finding, Omission, some_rule};
     use super::*;
 
-    /// A check with the given ratio and decision of the clock.
-    fn check(ratio: f64, pays: Option<bool>) -> Check {
-        Check {
-            on: "wide".to_owned(),
-            kept_ns: ratio * 100.0,
-            left_out_ns: 100.0,
-            ratio: Some(Estimate::exact(ratio)),
-            same_answers: true,
-            same_expected: true,
-            judged: 10,
-            pays,
-            ..Check::default()
-        }
+    /// A check with a ratio of times and what each side misses.
+    fn check(ratio: f64, missed: [f64; 2]) -> Check {
+        let times = Some(Estimate::exact(ratio));
+        let mut check = Check::of_times("wide".to_owned(), [ratio * 100.0, 100.0], times);
+        check.kept.false_negative_ppm = Some(missed[0]);
+        check.left_out.false_negative_ppm = Some(missed[1]);
+        check
     }
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
-        let rule = some_rule(LeftOutIf::AtMost, by);
-        rule.omission(Finding::new(statistic, 1.0, ""), vec![check])
+        some_rule(by).omission(Finding::new(statistic, 1.0, ""), Some(check))
     }
 
     #[test]
     fn the_clock_decides_where_it_can_and_the_rule_where_it_cannot() {
         let (small, large) = (0.5, 2.0);
-        let of = |statistic, pays| {
-            let omission = settled(By::Time, statistic, check(1.2, pays));
-            (omission.decision, omission.confirmed)
+        let of = |statistic, ratio: f64, ends| {
+            let mut check = check(ratio, [0.0; 2]);
+            check.ratio = Some(Estimate::within(ratio, ends));
+            settled(By::Time, statistic, check).decision
         };
-        assert_eq!(of(small, Some(true)), (Decision::LeaveOut, Some(true)));
-        assert_eq!(of(large, Some(true)), (Decision::LeaveOut, Some(false)));
-        assert_eq!(of(small, Some(false)), (Decision::Keep, Some(false)));
-        assert_eq!(of(large, Some(false)), (Decision::Keep, Some(true)));
-        assert_eq!(of(small, None), (Decision::LeaveOut, None));
-        assert_eq!(of(large, None), (Decision::Keep, None));
+        let (slower, faster) = ([1.1, 1.3], [0.7, 0.9]);
+        assert_eq!(of(small, 1.2, slower), Decision::LeaveOut);
+        assert_eq!(of(large, 1.2, slower), Decision::LeaveOut);
+        assert_eq!(of(small, 0.8, faster), Decision::Keep);
+        assert_eq!(of(large, 0.8, faster), Decision::Keep);
+        let tie = [0.9, 1.1];
+        assert_eq!(of(small, 1.0, tie), Decision::LeaveOut);
+        assert_eq!(of(large, 1.0, tie), Decision::Keep);
     }
 
     #[test]
     fn where_more_than_time_differs_the_rule_decides() {
         for (statistic, wanted) in [(0.5, Decision::LeaveOut), (2.0, Decision::Keep)] {
-            for pays in [true, false] {
-                let omission = settled(By::Rule, statistic, check(1.5, Some(pays)));
-                assert_eq!((omission.decision, omission.confirmed), (wanted, None));
+            for ratio in [1.5, 0.5] {
+                let mut check = check(ratio, [0.0; 2]);
+                check.same_answers = false;
+                let omission = settled(By::Rule, statistic, check);
+                assert!(omission.decision == wanted && !omission.is_wrong());
             }
         }
     }
 
     #[test]
     fn what_would_be_missed_is_kept_however_fast() {
-        let count = |false_negatives| ErrorCount {
-            false_negatives,
-            ..ErrorCount::default()
-        };
-        let mut blind = check(6.0, Some(true));
-        blind.errors = Some([count(1), count(2)]);
-        let mut other = check(6.0, Some(true));
+        let blind = check(6.0, [1.0, 2.0]);
+        let mut other = check(6.0, [0.0; 2]);
         other.same_answers = false;
-        for check in [blind, other] {
-            for by in [By::Time, By::Rule] {
-                let omission = settled(by, 0.5, check.clone());
-                assert_eq!(omission.decision, Decision::Keep, "{check:?}");
-                assert!(omission.reason.contains("missed"));
-            }
+        for (by, check) in [(By::Time, &blind), (By::Rule, &blind), (By::Time, &other)] {
+            let omission = settled(by, 0.5, check.clone());
+            assert_eq!(omission.decision, Decision::Keep, "{check:?}");
+            assert!(omission.reason.contains("missed"));
         }
-        let mut equally_blind = check(6.0, Some(true));
-        equally_blind.errors = Some([count(2), count(2)]);
-        let omission = settled(By::Time, 0.5, equally_blind);
+        let omission = settled(By::Time, 0.5, check(6.0, [2.0; 2]));
         assert_eq!(omission.decision, Decision::LeaveOut);
     }
 
     #[test]
     fn a_rule_without_a_statistic_does_not_apply() {
-        let rule = some_rule(LeftOutIf::AtLeast, By::Time);
-        let omission = rule.omission(Finding::none("for a reason".to_owned()), Vec::new());
+        let rule = some_rule(By::Time);
+        let omission = rule.omission(Finding::none("for a reason"), None);
         assert_eq!(omission.decision, Decision::NotApplicable);
-        assert_eq!((omission.predicted, omission.saving), (None, None));
-        // An infinite threshold cannot be written, but compares.
-        let rule = some_rule(LeftOutIf::AtMost, By::Time);
-        let omission = rule.omission(Finding::new(3.0, f64::INFINITY, ""), Vec::new());
-        assert_eq!((omission.threshold, omission.predicted), (None, Some(true)));
+        assert_eq!((omission.statistic, omission.saving), (None, None));
+        let omission = rule.omission(Finding::new(3.0, f64::INFINITY, ""), None);
+        assert_eq!(omission.decision, Decision::LeaveOut);
     }
 }

@@ -1,36 +1,18 @@
-//! Costs and limits of the advice, and its inputs.
+//! Inputs of the advice, and the structures that its plans name.
 
 use anyhow::{Result, ensure};
-use clap::Args;
-use serde::Serialize;
 
 use crate::culling::Culling;
 use crate::funnel::check_memory;
 use crate::index::{Execution, StructureSpec};
 use crate::measure::{Setting, Workload};
 use crate::motion::Motion;
-use crate::spec::values;
 
-/// Costs and limits that the advice depends on.
-#[derive(Args, Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct AdviseOptions {
-    /// Cost of drawing an item that is not visible, ns
-    #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
-    pub draw_ns: f64,
-    /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
-    #[arg(long, value_name = "NS", default_value_t = 1.0, value_parser = values::at_least_zero)]
-    pub shade_ns: f64,
-    /// Largest acceptable error: of planes relative to the depth of the view, of a
-    /// camera basis in radians
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-5, value_parser = values::above_zero)]
-    pub tolerance: f64,
-    /// Share of the items that move between two updates
-    #[arg(long, value_name = "SHARE", default_value = "1%", value_parser = values::share)]
-    pub moved: f64,
-    /// Queries between two updates
-    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = values::at_least_zero)]
-    pub queries_per_update: f64,
-}
+/// Largest acceptable error: of planes relative to the depth of the view, of a camera basis
+/// in radians.
+pub(super) const TOLERANCE: f64 = 1e-5;
+/// Reason for which rules about nodes do not apply.
+pub(super) const NO_NODES: &str = "the structure taken has no nodes";
 
 /// Bytes per item of the structures and trees of all rules; 950 were measured.
 const BYTES_PER_ITEM: u64 = 1000;
@@ -44,26 +26,22 @@ pub struct AdviseInput<'a> {
     pub motion: Option<&'a str>,
     /// Queries per frame.
     pub views: usize,
-    /// Costs and limits.
-    pub options: &'a AdviseOptions,
+    /// Cost of drawing an item that is not visible, ns.
+    pub draw_ns: f64,
 }
 
 impl<'a> AdviseInput<'a> {
     /// The queries of the path.
     ///
     /// # Errors
-    /// A scene without items, a path without cameras, an unfit motion.
+    /// A path without cameras, an unfit motion.
     pub fn workload(&self) -> Result<Workload<'a>> {
         let Setting { scene, path, .. } = self.setting;
-        for (kind, name, things, count) in [
-            ("scene", &scene.name, "items", scene.items.len()),
-            ("path", &path.name, "cameras", path.cameras.len()),
-        ] {
-            ensure!(
-                count > 0,
-                "{kind} '{name}' has no {things}; expected at least one"
-            );
-        }
+        ensure!(
+            !path.cameras.is_empty(),
+            "path '{}' has no cameras; expected at least one",
+            path.name
+        );
         check_memory(&scene.name, BYTES_PER_ITEM * scene.items.len() as u64)?;
         let motion = self.motion.map(|motion| Motion::load(motion, scene));
         let (motion, culling) = (motion.transpose()?, Culling::default());

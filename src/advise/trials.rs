@@ -6,12 +6,12 @@
 use std::ops::Deref;
 
 use super::case::Case;
-use super::omission::{Check, is_longer};
+use super::omission::{Check, Side};
 use crate::culling::CameraView;
 use crate::index::DynIndex;
-use crate::measure::{Ask, OverProcesses, TimedTask};
+use crate::measure::{Answer, Ask, OverProcesses, TimedTask};
 use crate::query::ItemId;
-use crate::verify::{ErrorCount, Trial};
+use crate::verify::ErrorCount;
 
 /// The task that all others are compared with: the fastest tree, six planes, f32.
 pub const BASE: usize = 0;
@@ -20,18 +20,14 @@ pub struct Trials<'c> {
     pub case: &'c Case<'c>,
     /// Tasks, and whether each is compared with the truth.
     asks: Vec<(Ask<'c>, bool)>,
-    /// CPU time of work that each process does once, ns.
-    pub once_ns: Vec<f64>,
 }
 
 /// Answers of all tasks.
 pub struct Answered {
-    /// Number of ids, by task and camera.
-    pub counts: Vec<Vec<u64>>,
+    /// By task and camera.
+    pub answers: Vec<Vec<Answer>>,
     /// Errors of each judged camera, of tasks that are compared with the truth.
     errors: Vec<Option<Vec<ErrorCount>>>,
-    /// Number of judged cameras.
-    pub judged: usize,
 }
 
 impl<'c> Trials<'c> {
@@ -39,7 +35,6 @@ impl<'c> Trials<'c> {
         let mut trials = Trials {
             case,
             asks: Vec::new(),
-            once_ns: Vec::new(),
         };
         trials.add_base();
         trials
@@ -48,18 +43,12 @@ impl<'c> Trials<'c> {
     /// Enters the base (again); the index of the task.
     pub fn add_base(&mut self) -> usize {
         let case = self.case;
-        self.index(&*case.index, case.views())
+        self.index(&*case.index, &case.workload.views[..])
     }
 
-    /// Enters a task whose answers are items of the scene in view; its index.
-    pub fn judged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
-        self.asks.push((Box::new(ask), true));
-        self.asks.len() - 1
-    }
-
-    /// Enters a task that is not compared with the truth of the frustum; its index.
-    pub fn unjudged(&mut self, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
-        self.asks.push((Box::new(ask), false));
+    /// Enters a task, and whether its answers are items of the scene in view; its index.
+    pub fn enter(&mut self, is_judged: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
+        self.asks.push((Box::new(ask), is_judged));
         self.asks.len() - 1
     }
 
@@ -69,58 +58,45 @@ impl<'c> Trials<'c> {
         index: impl Deref<Target = dyn DynIndex> + 'c,
         views: impl Deref<Target = [CameraView]> + 'c,
     ) -> usize {
-        self.judged(move |camera, out| index.query(views[camera].as_any(), out))
+        self.enter(true, move |camera, out| {
+            index.query(views[camera].as_any(), out)
+        })
     }
 
     /// Runs every task for every camera, and compares with the truth.
     pub fn answered(&self) -> Answered {
         let truths = self.case.truths();
         let mut answered = Answered {
-            counts: Vec::with_capacity(self.asks.len()),
+            answers: Vec::with_capacity(self.asks.len()),
             errors: Vec::with_capacity(self.asks.len()),
-            judged: truths.len(),
         };
         let mut out: Vec<ItemId> = Vec::new();
         for (ask, is_judged) in &self.asks {
             let mut errors = is_judged.then(Vec::new);
             let mut truths = truths.iter().peekable();
-            let counts = (0..self.case.cameras()).map(|camera| {
+            let answers = (0..self.case.cameras()).map(|camera| {
                 out.clear();
                 ask(camera, &mut out);
                 let truth = truths.next_if(|(judged, _)| *judged == camera);
                 if let (Some(errors), Some((_, truth))) = (&mut errors, truth) {
                     errors.push(truth.errors(&self.case.scene().items, &out));
                 }
-                out.len() as u64
+                Answer::of(&out)
             });
-            answered.counts.push(counts.collect());
+            answered.answers.push(answers.collect());
             answered.errors.push(errors);
         }
         answered
     }
 
-    /// Finds out whether two sides answer the same.
-    pub fn compare(&self, sides: &mut Sides) {
-        let [kept, left_out] = [sides.kept, sides.left_out].map(|task| &self.asks[task].0);
-        let mut trial = Trial::new(self.case.scene().items.len());
-        let mut first = Vec::new();
-        sides.check.same_answers = (0..self.case.cameras()).all(|camera| {
-            first.clear();
-            kept(camera, &mut first);
-            trial.expect(first.iter().copied());
-            trial.ask(|out| left_out(camera, out)).is_ok()
-        });
-    }
-
     /// All tasks, to be timed.
-    pub fn tasks(self, counts: &[Vec<u64>]) -> Vec<TimedTask<'c>> {
-        let asks = self.asks.into_iter().zip(counts);
-        asks.map(|((ask, _), counts)| TimedTask::new(counts.clone(), ask))
-            .collect()
-    }
-
-    pub fn len(&self) -> usize {
-        self.asks.len()
+    pub fn tasks(self, answers: &[Vec<Answer>]) -> Vec<TimedTask<'c>> {
+        let asks = self.asks.into_iter().zip(answers);
+        let tasks = asks.map(|((ask, _), answers)| {
+            let counts = answers.iter().map(|answer| answer.count);
+            TimedTask::new(counts.collect(), ask)
+        });
+        tasks.collect()
     }
 }
 
@@ -128,6 +104,12 @@ impl Answered {
     /// Errors of a task over all judged cameras.
     pub fn errors(&self, task: usize) -> Option<ErrorCount> {
         Some(self.by_camera(task)?.iter().copied().sum())
+    }
+
+    /// Mean of the judged cameras.
+    pub fn false_positives_per_query(&self, task: usize) -> Option<f64> {
+        let judged = self.by_camera(task).filter(|own| !own.is_empty())?.len();
+        Some(self.errors(task)?.false_positives as f64 / judged as f64)
     }
 
     /// Errors of a task, by judged camera.
@@ -138,53 +120,37 @@ impl Answered {
 
 /// The two sides of a check, by their tasks.
 pub struct Sides {
-    pub kept: usize,
-    pub left_out: usize,
-    /// The check before its times.
-    check: Check,
+    on: String,
+    kept: usize,
+    left_out: usize,
 }
 
 impl Sides {
-    /// Two sides that may differ.
     pub fn new(on: impl ToString, kept: usize, left_out: usize) -> Sides {
-        let check = Check {
-            on: on.to_string(),
-            ..Check::default()
-        };
         Sides {
+            on: on.to_string(),
             kept,
             left_out,
-            check,
         }
-    }
-
-    /// Two sides that must answer the same.
-    pub fn same(on: impl ToString, kept: usize, left_out: usize) -> Sides {
-        let mut sides = Sides::new(on, kept, left_out);
-        sides.check.same_expected = true;
-        sides
     }
 
     /// The check; NaN where a task has no time, after a panic.
     pub fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
-        let (kept, left_out) = (self.kept, self.left_out);
-        let ns = |task| times.ns(task).map_or(f64::NAN, |found| found.value);
-        let errors = [kept, left_out].map(|task| answered.errors(task));
-        let ratio = times.ratio(kept, left_out);
-        let excess = |errors: &Option<ErrorCount>| errors.as_ref().and_then(ErrorCount::excess);
-        let missed = |errors: &Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
+        let side = |task| {
+            let errors = answered.errors(task);
+            Side {
+                ns: times.ns(task).map_or(f64::NAN, |found| found.value),
+                excess: errors.and_then(|e| e.excess()),
+                false_positives_per_query: answered.false_positives_per_query(task),
+                false_negative_ppm: errors.and_then(|e| e.false_negative_ppm()),
+            }
+        };
         Check {
-            kept_ns: ns(kept),
-            left_out_ns: ns(left_out),
-            ratio,
-            kept_excess: excess(&errors[0]),
-            left_out_excess: excess(&errors[1]),
-            kept_false_negative_ppm: missed(&errors[0]),
-            left_out_false_negative_ppm: missed(&errors[1]),
-            errors: errors[0].zip(errors[1]).map(|(kept, left)| [kept, left]),
-            judged: answered.judged,
-            pays: ratio.and_then(is_longer),
-            ..self.check
+            kept: side(self.kept),
+            left_out: side(self.left_out),
+            ratio: times.ratio(self.kept, self.left_out),
+            on: self.on,
+            same_answers: answered.answers[self.kept] == answered.answers[self.left_out],
         }
     }
 }

@@ -54,7 +54,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
     note_solid(&setting.scene, args.format);
-    let table = || show(&blocks(&advice, args.all_columns, text::width()));
+    let table = || show(&blocks(&advice, args.all_columns));
     print(args.format, &advice, table)?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
@@ -106,7 +106,7 @@ fn input<'s>(args: &'s AdviseArgs, setting: &'s Setting) -> AdviseInput<'s> {
         setting,
         motion: args.moves.motion.first().map(String::as_str),
         views: args.moves.views,
-        options: &args.options,
+        draw_ns: args.draw_ns,
     }
 }
 

@@ -4,7 +4,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::advise::AdviseOptions;
 use crate::drift::DriftOptions;
 use crate::funnel::StageKind;
 use crate::spec::{SpecError, values};
@@ -333,14 +332,14 @@ pub struct PrecisionArgs {
 
 #[derive(Args, Debug)]
 #[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
-#[command(mut_arg("motion", |arg| arg.conflicts_with_all(["moved", "queries_per_update"])))]
 pub struct AdviseArgs {
     #[command(flatten)]
     pub study: StudyArgs,
     #[command(flatten)]
     pub moves: MotionArgs,
-    #[command(flatten)]
-    pub options: AdviseOptions,
+    /// Cost of drawing an item that is not visible, ns
+    #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
+    pub draw_ns: f64,
     /// Show the evidence too: every structure, test and rule with its times
     #[arg(long)]
     pub all_columns: bool,

@@ -17,9 +17,7 @@ pub use frames::Turn;
 pub use rated::Recommendation;
 pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 
-use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed, timed_rounds,
-};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
 use crate::spec::{SpecError, parse_number, values};
 use crate::statistics::{Estimate, flat};
 use frames::{QUERIES, QUERY_STEPS, STEADY, walking};
@@ -215,26 +213,14 @@ impl DriftReport {
     }
 }
 
-/// Errors of ways to turn after a number of steps, and their ns per step.
+/// Error of a way to turn after a number of steps, and a query of [`QUERY_STEPS`] of them.
 ///
-/// Times are those of this process alone, in the order of the table. The error of a basis
-/// that is lost is `None`; names without a method are left out.
-pub fn rotations(names: &[&str], steps: u64) -> Vec<(Option<f64>, f64)> {
-    let protocol = Protocol {
-        rounds: [5, 5],
-        cameras: QUERIES,
-        seed: 1,
-        ..Protocol::default()
-    };
-    let methods = METHODS.iter().filter(|method| names.contains(&method.name));
-    let tasks: Vec<TimedTask> = methods.clone().map(|m| walking(m.walk)).collect();
-    let timed = timed_rounds(QUERIES, &tasks, &protocol);
-    let errors = methods.map(|method| method.drift(&Period::new(steps)).error());
-    let rows = errors.zip(timed).map(|(error, timed)| {
-        let ns = timed.ok().and_then(|timed| timed.ns()).unwrap_or(f64::NAN);
-        ((!error.is_nan()).then_some(error), ns / QUERY_STEPS as f64)
-    });
-    rows.collect()
+/// The error of a basis that is lost is `None`.
+pub fn walk(name: &str, steps: u64) -> (Option<f64>, Ask<'static>) {
+    let method = METHODS.iter().find(|method| method.name == name);
+    let method = method.expect("a name of the table");
+    let error = method.drift(&Period::new(steps)).error();
+    ((!error.is_nan()).then_some(error), walking(method.walk).ask)
 }
 
 #[cfg(test)]

@@ -15,8 +15,6 @@ use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
 pub struct ProcessTimes {
     /// Per task: ln of the CPU ns per query; nothing where no camera is timed.
     pub ln_ns: Vec<Result<Option<f64>, Verdict>>,
-    /// CPU ns of what is done once and not in rounds, where there is such.
-    pub once_ns: Vec<f64>,
     /// Groups of cells that are measured beside the tasks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
@@ -43,8 +41,6 @@ pub struct OverProcesses<K = usize> {
     logs: Vec<Result<Vec<f64>, Verdict>>,
     /// The first task with times: what slows it slows all.
     reference: Vec<f64>,
-    /// ln ns of work that is done once, by process.
-    once: Vec<Vec<f64>>,
 }
 
 impl OverProcesses {
@@ -71,15 +67,10 @@ impl<K: PartialEq> OverProcesses<K> {
         };
         let logs: Vec<_> = (0..keys.len()).map(of_task).collect();
         let timed = logs.iter().flatten().find(|own| !own.is_empty());
-        let once = processes.first().map_or(0, |first| first.once_ns.len());
-        // Below the resolution of a clock there may be 0.
-        let ln = |process: &ProcessTimes, i: usize| process.once_ns[i].max(1.0).ln();
-        let of_once = |i: usize| processes.iter().map(|process| ln(process, i)).collect();
         OverProcesses {
             keys,
             reference: timed.cloned().unwrap_or_default(),
             logs,
-            once: (0..once).map(of_once).collect(),
         }
     }
 
@@ -118,16 +109,6 @@ impl<K: PartialEq> OverProcesses<K> {
             .collect()
     }
 
-    /// Time of work that is done once, ns.
-    pub fn once_ns(&self, i: usize) -> f64 {
-        one_run(&self.once[i], &self.once[i]).map_or(f64::NAN, |found| found.value)
-    }
-
-    /// Time of one piece of work that is done once / time of another.
-    pub fn once_ratio(&self, i: usize, other: usize) -> Option<Estimate> {
-        ratio(&self.once[i], &self.once[i], &self.once[other])
-    }
-
     /// Time of `task` / time of `other`: the ratio of the two that [`Self::ns`]
     /// gives.
     pub fn ratio(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> Option<Estimate> {
@@ -145,10 +126,9 @@ mod tests {
     use super::super::Status;
     use super::*;
 
-    fn process(ln_ns: [f64; 3], once: f64) -> ProcessTimes {
+    fn process(ln_ns: [f64; 3]) -> ProcessTimes {
         ProcessTimes {
             ln_ns: ln_ns.map(|ln_ns| Ok(Some(ln_ns))).into(),
-            once_ns: vec![once, 2.0 * once],
             ..ProcessTimes::default()
         }
     }
@@ -159,10 +139,7 @@ mod tests {
         let one = |n: usize| {
             let speed = 5.0 + if n.is_multiple_of(3) { 0.6 } else { 0.0 };
             let swing = if n.is_multiple_of(2) { 0.02 } else { -0.02 };
-            process(
-                [speed, speed + 0.1 + swing / 4.0, speed + 0.1 - swing],
-                100.0,
-            )
+            process([speed, speed + 0.1 + swing / 4.0, speed + 0.1 - swing])
         };
         (0..10).map(one).collect()
     }
@@ -181,9 +158,6 @@ mod tests {
         assert!(ends(c).0 <= c.value && c.value <= ends(c).1);
         assert!(times.is_faster(0, 1) && !times.is_faster(1, 0));
         assert!(!times.is_faster(1, 2) && !times.is_faster(2, 1));
-        assert!((times.once_ns(0) - 100.0).abs() < 1e-9);
-        let twice = times.once_ratio(1, 0).unwrap();
-        assert!((twice.value - 2.0).abs() < 1e-12 && twice.lower <= Some(twice.value));
     }
 
     #[test]

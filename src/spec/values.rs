@@ -65,15 +65,6 @@ pub fn far(text: &str) -> Result<f64, SpecError> {
     }
 }
 
-/// A share that is not nothing: `1%` or `0.01`.
-pub fn share(text: &str) -> Result<f64, SpecError> {
-    let what = "a share such as 1% or 0.01, above 0 and at most 100%";
-    match text.strip_suffix('%') {
-        Some(percent) => number(percent.trim(), what, |n| n > 0.0 && n <= 100.0).map(|n| n / 100.0),
-        None => number(text.trim(), what, |n| n > 0.0 && n <= 1.0),
-    }
-}
-
 /// "5%", "5 %" or "0.05". A bare 5 could be meant as either, and as 500 % it
 /// would let everything pass.
 pub fn threshold(typed: &str) -> Result<f64, SpecError> {

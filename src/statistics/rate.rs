@@ -6,7 +6,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::means::{mean, squares};
-use super::one_run::paired_difference;
 use super::student;
 use super::trimmed::Trimmed;
 
@@ -118,19 +117,6 @@ pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     is_above_zero(&[plain_difference(a, b)], alpha)
 }
 
-/// Compares the sums of the means of two independent samples, each paired by index:
-/// true if they show less for `a` than for `b`. `times` over processes by the
-/// difference of trimmed means, `counts` over clusters as in [`shows_less`], with
-/// the degrees of freedom of Welch. Under three processes the order of the sums
-/// decides.
-pub fn shows_less_in_sum(times: [&[f64]; 2], counts: [&[f64]; 2], alpha: f64) -> bool {
-    let counts = plain_difference(counts[0], counts[1]);
-    match paired_difference(times[1], times[0]) {
-        Some(times) => is_above_zero(&[times, counts], alpha),
-        None => plain_difference(times[0], times[1]).mean + counts.mean > 0.0,
-    }
-}
-
 /// `b - a`, without an error where there is but one cluster.
 fn plain_difference(a: &[f64], b: &[f64]) -> Trimmed {
     let differences: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
@@ -237,19 +223,5 @@ mod tests {
         assert!(!shows_less(&[0.0; 6], &one, 0.05));
         assert!(shows_less(&[0.0; 6], &[1.0; 6], 0.05) && !shows_less(&b, &b, 0.05));
         assert!(shows_less(&[1.0], &[2.0], 0.05) && !shows_less(&[], &[], 0.05));
-    }
-
-    #[test]
-    fn a_sum_is_as_uncertain_as_its_parts() {
-        let times = |base: f64| [0.0, 1.0, -1.0, 0.5, -0.5].map(|off| base + off / 100.0);
-        let (fast, slow) = (times(90.0), times(100.0));
-        let less = |a: &[f64], b: &[f64]| shows_less_in_sum([&fast, &slow], [a, b], 0.05);
-        // Drawn for certain, and too little to make up for it; then enough.
-        assert!(less(&[5.0; 4], &[0.0; 4]) && !less(&[15.0; 4], &[0.0; 4]));
-        // The same on the mean, all of it at one camera.
-        assert!(!less(&[20.0, 0.0, 0.0, 0.0], &[0.0; 4]));
-        // One process, one camera: the order decides.
-        assert!(shows_less_in_sum([&[1.0], &[3.0]], [&[1.0], &[0.0]], 0.05));
-        assert!(!shows_less_in_sum([&[1.0], &[3.0]], [&[3.0], &[0.0]], 0.05));
     }
 }

@@ -2,24 +2,25 @@
 
 use std::rc::Rc;
 
+use anyhow::bail;
 use glam::DVec3;
 
-use super::super::case::{Case, part_of};
+use super::super::case::part_of;
 use super::super::choice::TestChoice;
-use super::super::omission::{Decision, LeftOutIf};
-use super::super::rule::{Draft, Finding, not_applicable};
+use super::super::options::{NO_NODES, TOLERANCE};
+use super::super::rule::{Draft, Finding};
 use super::super::trials::{BASE, Sides, Trials};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
-use crate::geometry::{Aabb, BoxBlock, ConvexVolume, FrustumPlane, LANES, LaneMask, PlaneMask};
-use crate::index::{DynIndex, FrustumQuery, Input, Query, RegionIndex, Wide};
+use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
+use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, plane_test};
-use crate::shown::{count, counted, significant, time};
+use crate::shown::{count, counted};
 
-/// Share of the planes below which the saving is lost in noise.
-const LEAST_NEEDLESS: f64 = 0.01;
+/// Share of the planes above which the saving is lost in noise.
+const MOST_NEEDED: f64 = 0.99;
 
 /// Planes that the whole scene lies within: a camera does not need them.
 ///
@@ -27,34 +28,23 @@ const LEAST_NEEDLESS: f64 = 0.01;
 pub(super) fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let bounds = &case.scene().bounds;
-    let (mut needless, mut far, mut all) = (0, 0, 0);
+    let (mut needed, mut all) = (0, 0);
     let mut fewer = Vec::with_capacity(case.cameras());
     for volume in case.volumes() {
         let left = without_needless(volume, bounds);
         all += volume.planes().len();
-        needless += volume.planes().len() - left.planes().len();
-        let far_plane = volume.plane(FrustumPlane::Far);
-        far += usize::from(far_plane.is_some_and(|far| far.contains(bounds)));
+        needed += left.planes().len();
         fewer.push(CameraView::Volume(left));
     }
-    let share = needless as f64 / all.max(1) as f64;
+    let share = needed as f64 / all.max(1) as f64;
     let reason = format!(
-        "the whole scene is inside of {needless} of {}, and of the far plane for {far} of {}",
-        counted(all, "plane"),
-        counted(case.cameras(), "camera")
+        "scene is inside {} of {}",
+        all - needed,
+        counted(all, "plane")
     );
-    let fewer: Rc<[CameraView]> = fewer.into();
-    let scan: Rc<dyn DynIndex> = case.scan.build(&case.scene().items)?.into();
-    let on_tree = trials.index(&*case.index, fewer.clone());
-    let kept = trials.index(scan.clone(), case.views());
-    let left_out = trials.index(scan, fewer);
-    let sides = vec![
-        Sides::same(&case.spec.label, BASE, on_tree),
-        Sides::same(&case.scan.label, kept, left_out),
-    ];
-    let finding = Finding::new(share, LEAST_NEEDLESS, reason)
-        .noted(format!("scene is inside {:.0} % of them", share * 100.0));
-    Ok(Draft::new(sides, finding))
+    let left_out = trials.index(&*case.index, fewer);
+    let sides = Sides::new(&case.spec.label, BASE, left_out);
+    Ok(Draft::new(sides, Finding::new(share, MOST_NEEDED, reason)))
 }
 
 /// The volume without planes that contain the bounds: whatever lies within the
@@ -67,16 +57,16 @@ fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
     ConvexVolume::from_planes(&needed).unwrap_or_else(|_| volume.clone())
 }
 
-/// Share of the plane tests that has to go: a small tree saves a few percent,
-/// and carrying masks is not free.
-const LEAST_SAVED: f64 = 0.1;
+/// Share of the plane tests that may stay: a small tree saves a few percent, and carrying
+/// masks is not free.
+const MOST_TESTED: f64 = 0.9;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;
 
 /// Plane tests below a node that a plane contains.
 ///
 /// The mask of open planes that a node passes to its children leaves them out. The side
-/// without the rule is a view whose nodes never close a plane (unless they close all).
+/// with them is a view whose nodes never close a plane (unless they close all).
 pub(super) fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
@@ -89,19 +79,27 @@ pub(super) fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
         fewer += tree.counted(volume).1.planes_tested;
         all += tree.counted(&Unmasked(volume)).1.planes_tested;
     }
-    let mut finding = Finding::none("no plane is ever tested".to_owned());
+    let mut finding = Finding::none("no plane is ever tested");
     if all > 0 {
-        let saved = 1.0 - fewer as f64 / all as f64;
-        let [fewer, all] = [fewer, all].map(|tests| count(tests as usize));
-        let reason = format!("{fewer} plane tests with masks, {all} without");
-        finding = Finding::new(saved, LEAST_SAVED, reason)
-            .noted(format!("save {:.0} % of plane tests", saved * 100.0));
+        let reason = format!(
+            "masks leave {} of {} tests",
+            count(fewer as usize),
+            count(all as usize)
+        );
+        finding = Finding::new(fewer as f64 / all as f64, MOST_TESTED, reason);
     }
     let (other, views) = (tree.clone(), volumes.clone());
-    let kept = trials.judged(move |n, out| see(kernel, &other, &Unmasked(&views[n]), out));
-    let left_out = trials.judged(move |n, out| see(kernel, &tree, &volumes[n], out));
-    let sides = Sides::same(Wide::INFO.name, kept, left_out);
-    Ok(Draft::new(vec![sides], finding))
+    let kept = trials.enter(true, move |n, out| {
+        see(kernel, &other, &Unmasked(&views[n]), out)
+    });
+    let left_out = trials.enter(true, move |n, out| see(kernel, &tree, &volumes[n], out));
+    let sides = Sides::new(Wide::INFO.name, kept, left_out);
+    Ok(Draft::concluded(sides, |facts| {
+        match facts.structure.is_scan() {
+            true => Finding::none(NO_NODES),
+            false => finding,
+        }
+    }))
 }
 
 fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
@@ -152,44 +150,27 @@ impl QueryVolume for Unmasked<'_> {
 /// The exact test adds them. They cost test time and save the drawing of what cannot be
 /// seen.
 pub(super) fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
-    let case = trials.case;
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
-    let draw_ns = case.options.draw_ns;
-    let predicted = predicted_excess(case);
-    Ok(Draft::concluded(vec![sides], move |facts| {
-        let check = &facts.checks[0];
-        let Some(more) = check.more_false_positives() else {
-            return Finding::default();
+    Ok(Draft::concluded(sides, move |facts| {
+        let sides = facts.check.as_ref();
+        let sides = sides.map(|check| [&check.kept, &check.left_out]);
+        let more = sides.and_then(|[exact, six]| {
+            Some(six.false_positives_per_query? - exact.false_positives_per_query?)
+        });
+        let Some(([exact, six], more)) = sides.zip(more) else {
+            return Finding::none("no camera was judged");
         };
-        let (drawing, testing) = (more * draw_ns, check.kept_ns - check.left_out_ns);
-        let worth = testing / more;
-        let left_out = check.left_out_ns + drawing;
-        let reason = format!(
-            "{} invisible items per query ({:.2} %; 4 (s/D)^2 predicts {:.2} %) at {draw_ns} ns each, \
-             against the extra test time{}",
-            significant(more),
-            check.left_out_excess.unwrap_or(0.0) * 100.0,
-            predicted * 100.0,
-            match worth.is_finite() && worth > 0.0 {
-                true => format!("; worth it above {} per item", time(worth)),
-                false => String::new(),
-            }
-        );
-        let finding = Finding::new(drawing, testing, reason)
-            .noted(format!("with {draw_ns} ns/item drawn"))
-            .costing([check.kept_ns, left_out]);
+        let draw_ns = facts.draw_ns;
+        let reason = format!("with {draw_ns} ns/item drawn");
+        let finding = Finding::new(more * draw_ns, exact.ns - six.ns, reason);
         following(finding, facts.test)
     }))
 }
 
 /// Decides as the test that is taken, which has these axes or has not.
-///
-/// The statistic is then a prediction.
 fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
-    let compared = finding.compared;
-    let predicted = compared.and_then(|both| LeftOutIf::AtMost.holds(both));
-    let (Some(predicted), Some(taken)) = (predicted, choice.name) else {
+    let Some(taken) = choice.name else {
         return finding;
     };
     let with_axes = |name: &str| name == CullingTest::Exact.name();
@@ -200,36 +181,16 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
         let rows = rows.filter(|row| with != kept || row.test == taken);
         rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
     };
-    if let Some(both) = total(true).zip(total(false)) {
-        finding = finding.costing(both.into());
-    }
-    let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
-    finding.decision = Some(Decision::of(!kept));
-    finding.is_tie = Some(is_tie);
-    finding.confirmed = (!is_tie).then_some(predicted != kept);
-    finding.reason += &match is_tie {
-        true => format!("; a tie, {taken} is the simplest"),
-        false => format!("; {taken} is the test taken"),
-    };
+    finding.cost_ns = total(true).zip(total(false)).map(<[f64; 2]>::from);
+    finding.leaves_out = Some(!kept);
+    finding.is_tie = Some(choice.ties.iter().any(|name| with_axes(name) != kept));
     finding
-}
-
-/// `4 (s/D)^2` for the mean square of the items' edges s and the mean depth D
-/// of the views: docs/NUMERICS.md.
-fn predicted_excess(case: &Case) -> f64 {
-    let items = &case.scene().items;
-    let squared = |b: &Aabb| b.min.as_dvec3().distance_squared(b.max.as_dvec3()) / 3.0;
-    let squares = items.iter().map(squared);
-    let square = squares.sum::<f64>() / items.len() as f64;
-    let cameras = case.workload.cameras.len();
-    let depth = (0..cameras).map(|frame| case.depth(frame)).sum::<f64>() / cameras as f64;
-    4.0 * square / (depth * depth)
 }
 
 /// The tree with the views of a culling against the tree with the default views.
 fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides> {
     let case = trials.case;
-    let views = case.views_by(culling).map_err(not_applicable)?;
+    let views = case.views_by(culling)?;
     let kept = trials.index(case.tree_for(culling.test)?, views);
     Ok(Sides::new(&case.spec.label, kept, BASE))
 }
@@ -242,14 +203,16 @@ pub(super) fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
-    let (margin, tolerance) = (case.margin(&case.workload.around), case.options.tolerance);
-    let reason = format!(
-        "f32 planes are moved outward by up to {margin:.1e} of the depth; {tolerance:.0e} are tolerated"
-    );
-    let sides = against_base(trials, &in_f64)?;
-    let note = format!("f32 errs by {margin:.0e} of depth");
-    let finding = Finding::new(margin, tolerance, reason).noted(note);
-    Ok(Draft::new(vec![sides], finding))
+    let finding = of_margin(case.margin(&case.workload.around));
+    Ok(Draft::new(against_base(trials, &in_f64)?, finding))
+}
+
+fn of_margin(margin: f64) -> Finding {
+    Finding::new(
+        margin,
+        TOLERANCE,
+        format!("f32 errs by {margin:.0e} of depth"),
+    )
 }
 
 /// An origin of the scene's own.
@@ -260,41 +223,32 @@ pub(super) fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let scene = case.scene();
     if case.workload.around != scene.surroundings() {
-        return Err(not_applicable("a motion that leaves the scene"));
+        bail!("a motion that leaves the scene");
     }
     let is_moved = scene.origin != DVec3::ZERO;
     let bounds = scene.world_bounds();
     let centre = bounds.min / 2.0 + bounds.max / 2.0;
     let elsewhere = if is_moved { DVec3::ZERO } else { centre };
-    let other = part_of(scene, elsewhere, scene.items.len()).map_err(not_applicable)?;
+    let other = part_of(scene, elsewhere, scene.items.len())?;
     let workload = Workload::new(&other, case.path, &Culling::default());
-    let views = workload.map_err(not_applicable)?.views;
+    let views = workload?.views;
     let (at_zero, moved) = match is_moved {
         true => (&other, scene),
         false => (scene, &other),
     };
     let [margin, better] = [at_zero, moved].map(|scene| case.margin(&scene.surroundings()));
-    if margin > case.options.tolerance && better > margin / 2.0 {
-        return Err(not_applicable(
-            "about no origin are coordinates much smaller",
-        ));
+    if margin > TOLERANCE && better > margin / 2.0 {
+        bail!("about no origin are coordinates much smaller");
     }
     let there = trials.index(case.spec.build(&other.items)?, views);
-    let sides = [[there, BASE], [BASE, there]][usize::from(is_moved)];
-    let [x, y, z] = moved.origin.to_array().map(significant);
-    let reason = format!(
-        "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({x}, {y}, {z}); this scene {}",
-        ["stays where it is", "is moved"][usize::from(is_moved)]
-    );
-    let sides = Sides::new(&case.spec.label, sides[0], sides[1]);
-    let finding = Finding::new(margin, case.options.tolerance, reason)
-        .noted(format!("f32 errs by {margin:.0e} of depth"));
-    Ok(Draft::new(vec![sides], finding))
+    let [kept, left_out] = [[there, BASE], [BASE, there]][usize::from(is_moved)];
+    let sides = Sides::new(&case.spec.label, kept, left_out);
+    Ok(Draft::new(sides, of_margin(margin)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::By;
+    use super::super::super::omission::{By, Decision};
     use super::super::super::rule::some_rule;
     use super::*;
     use crate::geometry::Plane;
@@ -360,19 +314,14 @@ mod tests {
     fn the_test_taken_decides_about_the_axes() {
         let tests = ["six-plane", "six-box", "exact", "sphere"];
         for predicted in [true, false] {
-            for (taken, ties, decision, confirmed) in [
-                (tests[0], vec![], Decision::LeaveOut, Some(predicted)),
-                (tests[3], vec![], Decision::LeaveOut, Some(predicted)),
-                (tests[1], vec![], Decision::LeaveOut, Some(predicted)),
-                (tests[2], vec![], Decision::Keep, Some(!predicted)),
-                (tests[2], vec![tests[1]], Decision::Keep, None),
-                (tests[0], vec![tests[2]], Decision::LeaveOut, None),
-                (
-                    tests[1],
-                    vec![tests[3]],
-                    Decision::LeaveOut,
-                    Some(predicted),
-                ),
+            for (taken, ties, decision, is_tie) in [
+                (tests[0], vec![], Decision::LeaveOut, false),
+                (tests[3], vec![], Decision::LeaveOut, false),
+                (tests[1], vec![], Decision::LeaveOut, false),
+                (tests[2], vec![], Decision::Keep, false),
+                (tests[2], vec![tests[1]], Decision::Keep, true),
+                (tests[0], vec![tests[2]], Decision::LeaveOut, true),
+                (tests[1], vec![tests[3]], Decision::LeaveOut, false),
             ] {
                 let statistic = if predicted { 0.5 } else { 2.0 };
                 let finding = Finding::new(statistic, 1.0, "");
@@ -383,16 +332,15 @@ mod tests {
                     rows: Vec::new(),
                 };
                 let settled = |choice: &TestChoice| {
-                    let rule = some_rule(LeftOutIf::AtMost, By::Rule);
-                    rule.omission(following(finding.clone(), choice), Vec::new())
+                    some_rule(By::Rule).omission(following(finding.clone(), choice), None)
                 };
                 let omission = settled(&choice);
-                let found = (omission.decision, omission.confirmed);
-                assert_eq!(found, (decision, confirmed), "{taken} {:?}", choice.ties);
-                assert!(omission.reason.contains(taken), "{}", omission.reason);
+                let found = (omission.decision, omission.is_tie);
+                assert_eq!(found, (decision, is_tie), "{taken} {:?}", choice.ties);
                 // Without a test that is taken the rule decides.
                 choice.name = None;
-                assert_eq!(settled(&choice).decision, Decision::of(predicted));
+                let leaves_out = settled(&choice).decision == Decision::LeaveOut;
+                assert_eq!(leaves_out, predicted);
             }
         }
     }
