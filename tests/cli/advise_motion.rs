@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use super::advise::{advice, rule, small};
+use super::advise::{advice, metric, rule, small};
 use super::process::*;
 
 /// Options of frames of moving items, and of two threads.
@@ -35,33 +35,24 @@ fn advice_on_moving_items_has_the_rows_of_a_run() {
     let label = |row: &Value| row["structure"].as_str().expect("a label").to_owned();
     assert_eq!(rows.iter().map(label).collect::<BTreeSet<_>>(), planned);
     assert!(planned.contains("wide@every=5") && planned.contains("linear:threads=2"));
-    let times: Vec<f64> = rows.iter().map(|row| number(row, "frame_ns")).collect();
+    let times: Vec<f64> = rows.iter().map(|row| metric(row, "frame_ns")).collect();
     assert!(times.is_sorted(), "{times:?}");
     assert_eq!(moving()["structure"]["name"], rows[0]["structure"]);
     for row in rows {
-        let parts = number(row, "update_ns") + number(row, "query_ns");
-        assert!(parts <= number(row, "frame_ns") * 1.001, "{row}");
+        let parts = metric(row, "update_ns") + metric(row, "query_ns");
+        assert!(parts <= metric(row, "frame_ns") * 1.001, "{row}");
     }
     // The index saves what a frame by the best tree takes less than one by the best scan.
     let alone = rows.iter().filter(|row| !label(row).contains("threads="));
     let best = |is_scan| {
         let mut own = (alone.clone()).filter(|row| label(row).starts_with("linear") == is_scan);
-        number(own.next().expect("a row"), "frame_ns")
+        metric(own.next().expect("a row"), "frame_ns")
     };
     let saving = number(rule(moving(), "no-index"), "saving");
     let wanted = 1.0 - best(true) / best(false);
     assert!((saving - wanted).abs() < 1e-9, "{saving} {wanted}");
-    let motion = &moving()["motion"];
-    assert_eq!(
-        (number(motion, "share_moved"), number(motion, "views")),
-        (0.1, 2.0)
-    );
+    // Rebuilds in every frame were not asked for.
     assert_eq!(rule(moving(), "rebuild")["decision"], "not_applicable");
-    let shared = &array(moving(), "threads")[0];
-    assert_eq!(
-        (&shared["structure"], &shared["shares_views"]),
-        (&"linear:threads=2".into(), &false.into())
-    );
 }
 
 #[test]
@@ -114,7 +105,7 @@ fn policies_are_weighed_without_being_named() {
     for part in [
         "Update policies, side by side:",
         "Features, measured with and without on the still scene:",
-        "In motion, 100 % of the items and 1 query per frame: ",
+        "In motion: ",
         "A frame takes ",
         "every=10 ",
     ] {
@@ -138,14 +129,6 @@ fn mistakes_about_motion_are_one_line() {
             "--motion 'doors' | one motion",
         ),
         ("--motion drift --update often", "--update 'often'"),
-        (
-            "--motion drift --moved 50%",
-            "--motion | cannot be used with | --moved",
-        ),
-        (
-            "--motion drift --queries-per-update 7",
-            "--motion | cannot be used with | --queries-per-update",
-        ),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
     }
