@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::means::{mean, squares};
 use super::student;
-use super::trimmed::Trimmed;
 
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
@@ -114,30 +113,13 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
 /// The plain mean and no trimmed one: what is rare lies in few clusters, and
 /// those a trimmed mean leaves out.
 pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
-    is_above_zero(&[plain_difference(a, b)], alpha)
-}
-
-/// `b - a`, without an error where there is but one cluster.
-fn plain_difference(a: &[f64], b: &[f64]) -> Trimmed {
     let differences: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
-    let count = differences.len() as f64;
+    let (mean, count) = (mean(&differences), differences.len() as f64);
     let error = (squares(&differences) / (count * (count - 1.0))).sqrt();
-    Trimmed {
-        mean: mean(&differences),
-        standard_error: if error > 0.0 { error } else { 0.0 },
-        df: (count - 1.0).max(1.0),
-        count: differences.len(),
+    match error > 0.0 {
+        true => mean > student::quantile(1.0 - alpha / 2.0, count - 1.0) * error,
+        false => mean > 0.0,
     }
-}
-
-fn is_above_zero(parts: &[Trimmed], alpha: f64) -> bool {
-    let sum = |of: fn(&Trimmed) -> f64| parts.iter().map(of).sum::<f64>();
-    let (mean, square) = (sum(|p| p.mean), sum(|p| p.standard_error.powi(2)));
-    if square == 0.0 {
-        return mean > 0.0;
-    }
-    let df = square.powi(2) / sum(|p| p.standard_error.powi(4) / p.df);
-    mean > student::quantile(1.0 - alpha / 2.0, df) * square.sqrt()
 }
 
 #[cfg(test)]
