@@ -234,8 +234,9 @@ mod tests {
     use crate::measure::ProcessTimes;
     use crate::statistics::rate;
 
-    /// The tests near the least of tests with their query, what is drawn, ns, and what is
-    /// missed, over processes that are each a little off.
+    /// The tests near the least, over processes that are each a little off.
+    ///
+    /// Each with its query, what is drawn, ns, and what is missed.
     fn near(tests: &[(&'static str, f64, f64, f64)], processes: usize) -> Vec<&'static str> {
         let off = |n: usize, test: &str| 0.97 + 0.01 * ((n * test.len()) % 7) as f64;
         let process = |n| ProcessTimes {

@@ -22,7 +22,9 @@ pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
     }
 }
 
-/// Ratio of two costs, each given behind the time in it, from the ratio of these times.
+/// Ratio of two costs from the ratio of the times in them.
+///
+/// Each cost is given behind its time.
 pub(super) fn of_costs(times: Estimate, own: [f64; 2], other: [f64; 2]) -> Estimate {
     let ([own_ns, own], [other_ns, other]) = (own, other);
     let of = |ratio: f64| (ratio * other_ns + own - own_ns) / other;

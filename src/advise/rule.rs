@@ -19,7 +19,9 @@ pub struct Rule {
     pub name: &'static str,
     /// The work that is needed or left out, in words.
     pub left_out: &'static str,
-    /// Name and unit of the statistic; the rule leaves out where it is at most the threshold.
+    /// Name and unit of the statistic.
+    ///
+    /// The rule leaves out where it is at most the threshold.
     pub statistic_name: &'static str,
     #[serde(skip)]
     pub(super) by: By,
@@ -46,8 +48,9 @@ pub struct Facts<'f> {
 pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
     pub compared: Option<[f64; 2]>,
-    /// Assumption or error that decides, in at most 30 characters, or why the rule does not
-    /// apply.
+    /// Assumption or error that decides, in at most 30 characters.
+    ///
+    /// Or why the rule does not apply.
     pub reason: String,
     /// Time with and without, where more than the check counts, ns.
     pub cost_ns: Option<[f64; 2]>,

@@ -46,7 +46,9 @@ impl<'c> Trials<'c> {
         self.index(&*case.index, &case.workload.views[..])
     }
 
-    /// Enters a task, and whether its answers are items of the scene in view; its index.
+    /// Enters a task; its index.
+    ///
+    /// It is judged if its answers are items of the scene in view.
     pub fn enter(&mut self, is_judged: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
         self.asks.push((Box::new(ask), is_judged));
         self.asks.len() - 1

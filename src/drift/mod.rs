@@ -213,9 +213,9 @@ impl DriftReport {
     }
 }
 
-/// Error of a way to turn after a number of steps, and a query of [`QUERY_STEPS`] of them.
+/// Error of a way to turn after a number of steps, and a query of some of them.
 ///
-/// The error of a basis that is lost is `None`.
+/// A query walks [`QUERY_STEPS`]. The error of a basis that is lost is `None`.
 pub fn walk(name: &str, steps: u64) -> (Option<f64>, Ask<'static>) {
     let method = METHODS.iter().find(|method| method.name == name);
     let method = method.expect("a name of the table");

@@ -57,8 +57,9 @@ fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
     ConvexVolume::from_planes(&needed).unwrap_or_else(|_| volume.clone())
 }
 
-/// Share of the plane tests that may stay: a small tree saves a few percent, and carrying
-/// masks is not free.
+/// Share of the plane tests that may stay.
+///
+/// A small tree saves a few percent, and carrying masks is not free.
 const MOST_TESTED: f64 = 0.9;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;

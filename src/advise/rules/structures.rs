@@ -115,7 +115,7 @@ pub(super) fn rebuild() -> anyhow::Result<Draft> {
 /// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
 const DRIFT: f64 = 5e-8;
 
-/// Correcting a camera's frame by a Newton step to the polar factor every 100 steps.
+/// Correcting a camera's frame, by a polar Newton step every 100 steps.
 ///
 /// Axes in f32 that are turned and never straightened drift by some 5e-8 a step. A frame
 /// that is built for each camera, or takes few steps, does not need it. Checked by walking.
