@@ -5,8 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::drift::DriftOptions;
-use crate::funnel::StageKind;
-use crate::spec::{SpecError, values};
+use crate::spec::values;
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -17,9 +16,6 @@ use super::shared_args::{
     TableFormat, WhatArgs,
 };
 use super::{program, text};
-
-/// The default path of a stage: those behind the frustum have work there.
-const STREET: &str = "street:frames=32";
 
 /// Benchmarks spatial indexes: frustum culling, region search, checked answers
 #[derive(Parser, Debug)]
@@ -295,14 +291,7 @@ pub struct VerifyArgs {
     pub culling: CullingArgs,
 }
 
-/// A stage of the funnel whose error and time can be swept.
-fn stage(name: &str) -> Result<StageKind, SpecError> {
-    let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
-    values::choice("stage", &swept.map(|stage| (stage, stage.name(), "")))(name)
-}
-
 #[derive(Args, Debug)]
-#[command(mut_arg("path", |arg| arg.default_value_if("stage", ArgPredicate::IsPresent, STREET)))]
 pub struct PrecisionArgs {
     #[command(flatten)]
     pub study: StudyArgs,
@@ -321,11 +310,6 @@ pub struct PrecisionArgs {
     /// Also draw false positives against time as an SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Study another stage of the funnel instead of the object stage: occlusion (sizes
-    /// of its buffer), region (portals) or triangle (cones). The first structure runs
-    /// the object stage; the default path is street
-    #[arg(long, value_name = "STAGE", value_parser = stage, conflicts_with_all = ["cubes", "all", "html", "svg"])]
-    pub stage: Option<StageKind>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
 }

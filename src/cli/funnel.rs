@@ -148,7 +148,7 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
 }
 
 /// Reason for which a scene has no back end of a stage.
-pub fn nothing_for_it(scene: &Scene) -> String {
+fn nothing_for_it(scene: &Scene) -> String {
     let why = text::some(funnel::left_out_of(scene), |row| {
         format!(": {}", row.reason)
     });

@@ -40,10 +40,11 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let is_unproven = row.back_end.guarantee == Guarantee::Unproven;
         is_unproven && row.back_end.stage == StageKind::Occlusion && (all || row.is_chosen)
     };
-    let loss = report.stages.iter().any(may_lose).then(|| {
-        let line = "?: FN at these samples only; between them: precision --stage occlusion";
-        [Block::line(""), Block::line(line)]
-    });
+    let loss = report
+        .stages
+        .iter()
+        .any(may_lose)
+        .then(|| [Block::line(""), Block::line("?: FN at these samples only")]);
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
     if let Some(row) = report.stages.iter().find(both) {
         let what = "searches a tree of its own: its time includes the object stage.";

@@ -10,22 +10,22 @@ use super::world::{View, World};
 use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
+use crate::visibility::occlusion;
 use crate::visibility::region::{IdSet, Scratch};
-use crate::visibility::{SampleGrid, occlusion};
 
 /// Appends the items of a view that a stage leaves of those given (`None`: all).
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
-    /// A back end of a stage of whole items, with an occlusion buffer of this size.
+    /// A back end of a stage of whole items.
     ///
     /// # Panics
     /// If there is no such back end.
-    pub fn run(&self, stage: StageKind, name: &str, buffer: SampleGrid) -> Run<'_> {
+    pub fn run(&self, stage: StageKind, name: &str) -> Run<'_> {
         match stage {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
-            StageKind::Occlusion => self.run_occlusion(name, buffer),
+            StageKind::Occlusion => self.run_occlusion(name),
             StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
         }
     }
@@ -60,15 +60,15 @@ impl World<'_> {
         })
     }
 
-    fn run_occlusion(&self, name: &str, buffer: SampleGrid) -> Run<'_> {
+    fn run_occlusion(&self, name: &str) -> Run<'_> {
         let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
         let row = row.expect("a row of the occlusion stage");
-        let occlude = RefCell::new((row.build)(buffer, self.kernel));
+        let occlude = RefCell::new((row.build)(self.samples, self.kernel));
         let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
         Box::new(move |view, input, out| {
             let occluders = occluders[view];
             let View { rays, volume, .. } = &self.views[view];
-            let view = occlusion::View::new(rays, volume, occluders, buffer);
+            let view = occlusion::View::new(rays, volume, occluders, self.samples);
             (occlude.borrow_mut())(occluders, &view, out);
             // A traversal of the whole scene ignores the visible regions.
             if let (Some(items), true) = (input, self.regions.is_some()) {
@@ -122,7 +122,7 @@ impl<'w> ItemStages<'w> {
             return;
         }
         self.run(before);
-        let run = self.world.run(*stage, name, self.world.samples);
+        let run = self.world.run(*stage, name);
         let output = self.world.views().map(|view| {
             let mut ids = Vec::new();
             run(view, self.items(before, view), &mut ids);
@@ -179,7 +179,7 @@ impl<'w> ItemStages<'w> {
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.left.iter().map(|(steps, _)| {
             let (stage, name) = steps.last().expect("at least one step");
-            let run = self.world.run(*stage, name, self.world.samples);
+            let run = self.world.run(*stage, name);
             let input = self.behind(&steps[..steps.len() - 1]);
             let ask: Ask = Box::new(move |view, out| {
                 run(view, input.map(|left| &left[view][..]), out);

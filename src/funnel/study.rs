@@ -179,7 +179,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     rounded.iter().for_each(|text| warn(text));
     warnings.extend(rounded);
     begin("truth");
-    let truth = visible(&world, 0, input.execution.threads)?;
+    let truth = visible(&world, input.execution.threads)?;
     begin("every stage, compared with the truth");
     let study = Study::new(&world, input)?;
     let mut rows = study.rows(&truth);

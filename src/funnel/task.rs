@@ -1,7 +1,6 @@
 //! Timed tasks of a study by key: plan, timed pass, and times over the processes.
 
 use std::collections::HashMap;
-use std::hash::Hash;
 
 use serde::{Deserialize, Serialize};
 
@@ -56,14 +55,14 @@ impl FunnelKey {
 }
 
 /// A task of the timed pass; the number of ids that it appends is checked.
-pub type KeyedTask<'w, K = FunnelKey> = (K, Ask<'w>);
+pub type KeyedTask<'w> = (FunnelKey, Ask<'w>);
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 pub type FunnelPlan = StudyPlan<FunnelKey>;
 
-impl<K: Clone + Eq + Hash> StudyPlan<K> {
+impl FunnelPlan {
     /// Does every task once in each of `views` views, and plans their times.
-    pub fn of(tasks: Vec<KeyedTask<K>>, views: usize, input: &FunnelInput) -> StudyPlan<K> {
+    pub fn of(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
         let mut out = Vec::new();
         let mut count = |ask: &Ask, view| {
             out.clear();
@@ -80,20 +79,20 @@ impl<K: Clone + Eq + Hash> StudyPlan<K> {
     /// Times of one process.
     ///
     /// A planned task that this process does not have fails by its counts.
-    pub fn time(&self, tasks: Vec<KeyedTask<K>>, input: &FunnelInput) -> ProcessTimes {
-        let mut asks: HashMap<K, Ask> = tasks.into_iter().collect();
-        let ask = |key: &K| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
+    pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
+        let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
+        let ask = |key: &FunnelKey| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
         ProcessTimes::of(&self.timed(&input.setting.protocol, ask))
     }
 
     /// Expected numbers of ids of a task, by view.
-    pub fn expected(&self, key: &K) -> Option<&[u64]> {
+    pub fn expected(&self, key: &FunnelKey) -> Option<&[u64]> {
         let found = self.tasks.iter().find(|(own, _)| own == key);
         found.map(|(_, expected)| &expected[..])
     }
 
     /// Times of all processes.
-    pub fn times(&self, processes: &[ProcessTimes]) -> OverProcesses<K> {
+    pub fn times(&self, processes: &[ProcessTimes]) -> OverProcesses<FunnelKey> {
         let keys = self.tasks.iter().map(|(key, _)| key.clone());
         OverProcesses::keyed(keys.collect(), processes)
     }

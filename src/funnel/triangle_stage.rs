@@ -131,17 +131,13 @@ impl TriangleStage {
         let built = self.views.first().map(|faces| &faces.built.culls);
         built.into_iter().flatten().map(move |(name, _)| {
             let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
-            (key, self.ask(name))
-        })
-    }
-
-    /// A back end by its name.
-    pub fn ask(&self, name: &'static str) -> Ask<'_> {
-        Box::new(move |view, out| {
-            let kept = self.kept(name, view);
-            let clusters = kept.words().iter().zip(0..);
-            let left = clusters.filter(|(word, _)| **word != 0);
-            out.extend(left.map(|(_, cluster)| cluster));
+            let ask: Ask = Box::new(move |view, out| {
+                let kept = self.kept(name, view);
+                let clusters = kept.words().iter().zip(0..);
+                let left = clusters.filter(|(word, _)| **word != 0);
+                out.extend(left.map(|(_, cluster)| cluster));
+            });
+            (key, ask)
         })
     }
 

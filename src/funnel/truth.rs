@@ -9,9 +9,7 @@ use super::error::most_drawn;
 use super::world::{Shape, World};
 use crate::query::ItemId;
 use crate::statistics::{Rate, rate_of};
-use crate::visibility::truth::{
-    RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
-};
+use crate::visibility::truth::{RayIndex, SampleTruth, SolidBox, SurfaceIndex};
 use crate::visibility::{Rays, SampleGrid, fragment};
 
 /// Samples that estimate how many items are in front at all samples.
@@ -23,13 +21,11 @@ const TESTS_PER_ITEM: u64 = 16;
 /// Visible items of each view with the samples of each, ascending.
 pub type Truth = Vec<Vec<(ItemId, u32)>>;
 
-/// Visible items at the samples of every view and along random rays.
-///
-/// Items that only some of the `random_rays` rays meet count as one sample each.
+/// Visible items at the samples of every view.
 ///
 /// # Errors
 /// Too many items in front at the same samples, or too many bodies around the eye.
-pub fn visible(world: &World, random_rays: usize, threads: usize) -> anyhow::Result<Truth> {
+pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
     let items = world.items() as ItemId;
@@ -41,12 +37,6 @@ pub fn visible(world: &World, random_rays: usize, threads: usize) -> anyhow::Res
         let truth = truth.map_err(|error| anyhow!("camera {camera}: {error}"))?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
-        if random_rays > 0 {
-            let more = rays_end.along_random(rays, random_rays, view as u64 + 1, threads);
-            let is_new = |id: &ItemId| truth.visible.binary_search(id).is_err();
-            seen.extend(more.into_iter().filter(is_new).map(|id| (id, 1)));
-            seen.sort_unstable();
-        }
         // Floors and ceilings of a map come behind its items.
         seen.retain(|(item, _)| *item < items);
         all.push(seen);
@@ -112,13 +102,6 @@ impl RaysEnd<'_> {
             }
             RaysEnd::Boxes(index, None) => SampleTruth::of(index, rays, grid, threads),
             RaysEnd::Triangles(index) => SampleTruth::of(index, rays, grid, threads),
-        }
-    }
-
-    fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
-        match self {
-            RaysEnd::Boxes(index, _) => visible_by_random_rays(index, rays, count, seed, threads),
-            RaysEnd::Triangles(index) => visible_by_random_rays(index, rays, count, seed, threads),
         }
     }
 }

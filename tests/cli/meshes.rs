@@ -124,33 +124,6 @@ fn a_mesh_is_a_scene_of_every_command() {
 }
 
 #[test]
-fn sweeps_of_stages_take_meshes() {
-    let line = "precision --scene mesh:spheres:n=40k --stage occlusion --path flythrough:frames=4 \
-                --processes 1 --structure wide --format json";
-    let points = json(&works(Path::new("."), line));
-    assert_eq!(points["rays_per_view"], 100_000);
-    let of = |name: &str, figure: &str| {
-        let own = array(&points, "points")
-            .iter()
-            .filter(|point| point["name"] == name);
-        own.map(|point| number(point, figure)).collect::<Vec<_>>()
-    };
-    assert_eq!(of("masked-inner", "false_negative_count"), [0.0; 7]);
-    let [given, left] = ["input_count", "output_count"].map(|figure| of("masked-inner", figure)[6]);
-    assert!(left < given, "{left} of {given}");
-    let cones = json(&works(
-        Path::new("."),
-        &line.replace("occlusion", "triangle"),
-    ));
-    for point in array(&cones, "points") {
-        if point["guarantee"] != "unproven" {
-            assert_eq!(number(point, "false_negative_count"), 0.0, "{point}");
-        }
-        assert!(number(point, "truth_count") > 1000.0);
-    }
-}
-
-#[test]
 fn what_a_mesh_cannot_be_is_refused_in_a_line() {
     let here = Path::new(".");
     for (line, wanted) in [
@@ -165,10 +138,6 @@ fn what_a_mesh_cannot_be_is_refused_in_a_line() {
         (
             "scene info mesh:statue:offset=1e300",
             "mesh:statue | item 0 | f32",
-        ),
-        (
-            "precision --stage region --scene mesh:spheres:n=3k",
-            "rooms or sectors",
         ),
     ] {
         assert_refused(&cullbench(here, line), wanted, line);

@@ -108,23 +108,7 @@ fn mistakes_are_one_line() {
             "avx3 | did you mean 'avx2'",
         ),
         ("--scene city:n=10 --processes 0", "0 | --processes"),
-        ("--scene city:n=10 --stage region", "--cubes | --stage"),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
-    }
-    for option in ["--all", "--svg a.svg", "--html a.html"] {
-        let line = format!("precision --scene city:n=10 --stage occlusion {option}");
-        all_refused(&folder, &[line], "--stage");
-    }
-}
-
-#[test]
-fn a_stage_has_its_own_path_unless_one_is_typed() {
-    let line = "precision --scene city:n=50 --stage triangle --frames 1 --processes 1 \
-                --structure linear --format json";
-    let by = |more: &str| json(&works(Path::new("."), &format!("{line}{more}")))["path"].clone();
-    assert_eq!(by(""), "street:frames=32");
-    for typed in ["flythrough", "orbit:frames=1"] {
-        assert_eq!(by(&format!(" --path {typed}")), typed);
     }
 }

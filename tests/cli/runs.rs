@@ -274,12 +274,7 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
         &["compare none none"],
         "nothing can be judged: of 2 cells in common",
     );
-    for study in [
-        "precision",
-        "precision --stage triangle",
-        "advise",
-        "funnel",
-    ] {
+    for study in ["precision", "advise", "funnel"] {
         let line = format!("{study} --scene none.csv --path outside:frames=1");
         let told = works(folder.path(), &line);
         let left_out = "none.csv: left out: the scene has no items: there is nothing to time\n";

@@ -155,7 +155,6 @@ fn studies_fit() {
     let drift = "drift --steps 1e3 --processes 3 --seconds 1 --stiffness 1e2,1e4";
     for line in [
         format!("{precision} --all"),
-        format!("precision --scene city:n=100 {few} --frames 2 --stage occlusion"),
         format!("{funnel} --scene rooms:n=300"),
         format!("{funnel} --scene freedm-map12 --all"),
         format!("{funnel} --scene city:n=300 --all --no-picks --cut-out fence"),

@@ -11,8 +11,7 @@ mod slabs;
 #[cfg(test)]
 pub(super) mod tests;
 
-use crate::query::{ItemId, distinct};
-use crate::scene::SeededRng;
+use crate::query::ItemId;
 use crate::threads;
 use crate::visibility::{Rays, SampleGrid};
 
@@ -24,7 +23,7 @@ pub use ray_tree::Candidates;
 pub use ray_triangle::{Meeting, TriangleProbe};
 
 #[cfg(test)]
-pub(super) use tests::judge;
+pub(super) use tests::{judge, visible_by_random_rays};
 
 /// In place of an item where a ray meets nothing.
 pub const NO_ITEM: ItemId = ItemId::MAX;
@@ -108,33 +107,4 @@ fn counted(
         .for_each(|item| samples[item as usize] += 1);
     let counts = (0..).zip(samples);
     counts.filter(|(_, count)| *count > 0).unzip()
-}
-
-/// Items visible along any of `count` seeded random rays through the window.
-///
-/// Ascending. A conservative back end delivers all of them.
-/// The same on any number of threads.
-pub fn visible_by_random_rays<B: Body>(
-    index: &BodyIndex<B>,
-    rays: &Rays,
-    count: usize,
-    seed: u64,
-    threads: usize,
-) -> Vec<ItemId> {
-    const CHUNK: usize = 4096;
-    let mut found = vec![Vec::new(); count.div_ceil(CHUNK)];
-    threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
-        // A random stream per chunk, whichever thread takes it.
-        let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
-        let mut seen = Front::new();
-        for _ in 0..CHUNK.min(count - chunk * CHUNK) {
-            let (x, y) = (rng.unit(), rng.unit());
-            seen.search(index, &rays.through(x, y), &|_, _, _| true);
-            found.extend_from_slice(&seen.front);
-            found.extend_from_slice(&seen.before);
-        }
-        found.sort_unstable();
-        found.dedup();
-    });
-    distinct(found.concat())
 }

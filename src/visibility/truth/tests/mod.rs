@@ -3,3 +3,38 @@
 mod boxes;
 pub mod judge;
 mod triangles;
+
+use super::{Body, BodyIndex, Front};
+use crate::query::{ItemId, distinct};
+use crate::scene::SeededRng;
+use crate::threads;
+use crate::visibility::Rays;
+
+/// Items visible along any of `count` seeded random rays through the window.
+///
+/// Ascending. A conservative back end delivers all of them.
+/// The same on any number of threads.
+pub fn visible_by_random_rays<B: Body>(
+    index: &BodyIndex<B>,
+    rays: &Rays,
+    count: usize,
+    seed: u64,
+    threads: usize,
+) -> Vec<ItemId> {
+    const CHUNK: usize = 4096;
+    let mut found = vec![Vec::new(); count.div_ceil(CHUNK)];
+    threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
+        // A random stream per chunk, whichever thread takes it.
+        let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
+        let mut seen = Front::new();
+        for _ in 0..CHUNK.min(count - chunk * CHUNK) {
+            let (x, y) = (rng.unit(), rng.unit());
+            seen.search(index, &rays.through(x, y), &|_, _, _| true);
+            found.extend_from_slice(&seen.front);
+            found.extend_from_slice(&seen.before);
+        }
+        found.sort_unstable();
+        found.dedup();
+    });
+    distinct(found.concat())
+}
