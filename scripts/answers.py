@@ -126,7 +126,7 @@ def answers():
                                   "--format", "json"))
         point = ("test", "arithmetic", "planes", "epsilon")
         for section, names in (("points", ("structure", *point)), ("sweeps", ("sweep", *point)),
-                               ("region_points", ("structure", "numbers")), ("size_sweep", ("size_over_depth",))):
+                               ("size_sweep", ("size_over_depth",))):
             for name, rows in rows_by(found[section], *names).items():
                 yield f"precision {scene} {section} {name}", rows
     found = json.loads(output("drift", "--steps", "1e3", "--processes", "1", "--seconds", "1", "--rate", "60",

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::args::PrecisionArgs;
 use super::document::{Block, show};
-use super::figure::picture;
+use super::figure::{Figure, picture};
 use super::page::to_page;
 use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
@@ -53,12 +53,14 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
         sweeps,
         ..prepared.conclude(&times)
     };
-    let wrong = outcome.points.iter().any(is_wrong) || outcome.region_points.iter().any(is_wrong);
+    let wrong = outcome.points.iter().any(is_wrong);
     let shown = print(args.format, &outcome, || {
         let room = if args.all { usize::MAX } else { text::width() };
         show(&blocks(&outcome, args.all, room))
     });
-    let figures = precision_conclusions::figures(&outcome);
+    let figures: Vec<Figure> = precision_conclusions::figure(&outcome)
+        .into_iter()
+        .collect();
     write_if(&args.svg, || picture(&figures, 1))?;
     write_if(&args.html, || {
         let title = format!("precision {}, {}", args.study.scene, args.study.path);
@@ -76,7 +78,7 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
     blocks.push(Block::heading("Conclusions:"));
     let told = precision_conclusions::conclusions(outcome).into_iter();
     blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
-    let more = "every point, region search and sweeps: --all";
+    let more = "every point and sweeps: --all";
     blocks.extend(Block::more(all, more));
     blocks
 }

@@ -4,36 +4,35 @@
 use super::diagram;
 use super::error_figure::{Measured, against};
 use super::figure::{Figure, ends};
-use super::precision_tables::{CullingPoint, elsewhere, named, numbers, percent, swept};
+use super::precision_tables::{elsewhere, named, numbers, percent, swept};
 use super::text;
 use crate::measure::Status;
-use crate::precision::{Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow};
-use crate::statistics::Rate;
+use crate::precision::{Point, Precision, SWEEPS, SizeRow, SweepRow};
 
 pub fn conclusions(p: &Precision) -> Vec<String> {
     let (sizes, sweeps) = (of_sizes(&p.size_sweep), of_sweeps(&p.sweeps));
-    let others = [of_storage(p), of_regions(p), sizes, sweeps].into_iter();
+    let others = [of_storage(p), sizes, sweeps].into_iter();
     of_points(p).into_iter().chain(others.flatten()).collect()
 }
 
 /// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
-fn is_safe(point: &&CullingPoint) -> bool {
+fn is_safe(point: &&Point) -> bool {
     let errors = point.errors.counts.unwrap_or_default();
     let missed = errors.false_negatives + errors.touch_dropped;
     point.time.is_some() && missed == 0 && point.errors.names.epsilon > 0.0
 }
 
-fn missed(point: &CullingPoint) -> u64 {
+fn missed(point: &Point) -> u64 {
     point.errors.counts.unwrap_or_default().false_negatives
 }
 
-fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
+fn ratio(a: &Point, b: &Point) -> String {
     let both = a.query_ns().zip(b.query_ns());
     text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
 }
 
 /// The false positives of a point in words.
-fn extras(point: &CullingPoint) -> String {
+fn extras(point: &Point) -> String {
     match point.errors.excess {
         None => "nothing is visible".to_owned(),
         excess => format!("false positives {} %", percent(excess)),
@@ -50,7 +49,7 @@ fn of_points(p: &Precision) -> Vec<String> {
         "Fastest point that cannot miss an item: {name} at {time}, {}.",
         extras(fastest)
     )];
-    let extra = |point: &CullingPoint| point.errors.counts.map(|errors| errors.false_positives);
+    let extra = |point: &Point| point.errors.counts.map(|errors| errors.false_positives);
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
@@ -58,7 +57,7 @@ fn of_points(p: &Precision) -> Vec<String> {
             "Fewer false positives take {times} times as long or more: {name}, {extra}."
         ));
     }
-    let depth = |point: &CullingPoint| point.errors.worst_miss_px.unwrap_or(0.0);
+    let depth = |point: &Point| point.errors.worst_miss_px.unwrap_or(0.0);
     let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
     let worst = unsafe_.max_by(|a, b| depth(a).total_cmp(&depth(b)));
     all.push(match worst {
@@ -76,12 +75,12 @@ fn of_points(p: &Precision) -> Vec<String> {
 }
 
 /// The structure itself is at fault, so that its errors are not known.
-pub fn is_wrong<E>(point: &Point<E>) -> bool {
+pub fn is_wrong(point: &Point) -> bool {
     matches!(point.status, Status::Wrong | Status::Panicked)
 }
 
 fn of_storage(p: &Precision) -> Option<String> {
-    let memory = |point: &&CullingPoint| point.errors.memory_bytes_per_item;
+    let memory = |point: &&Point| point.errors.memory_bytes_per_item;
     let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     let (name, bytes) = (named(least), text::significant(memory(&least)));
@@ -89,27 +88,6 @@ fn of_storage(p: &Precision) -> Option<String> {
     let time = text::some(least.query_ns(), text::time);
     Some(format!(
         "Least memory: {name} at {bytes} B/item, {extra}, {time}."
-    ))
-}
-
-fn of_regions(p: &Precision) -> Option<String> {
-    let of = |numbers: &'static str| {
-        let points = p.region_points.iter();
-        points.filter(move |point| point.errors.numbers == numbers)
-    };
-    let (plain, checked) = (of("f32").next()?, of("f32 + check").next()?);
-    let mut same = of("f32 + check").filter(|point| point.structure == plain.structure);
-    let cost = same.next().and_then(|point| point.query_ns());
-    let cost = cost.zip(plain.query_ns());
-    let (errors, rest) = (&plain.errors, &checked.errors);
-    let points = text::counted(errors.points as usize, "point");
-    let (wrong, farthest) = (percent(errors.wrong), text::significant(errors.worst_false));
-    let left = rest.false_region_count + rest.missed_region_count;
-    let times = text::significant(cost.map_or(f64::NAN, |(a, b)| a / b));
-    Some(format!(
-        "Region search in f32 is wrong for {wrong} % of {points} (farthest {farthest} outside); an \
-         exact test of the hits leaves {left} wrong and takes {times} times as long on {}.",
-        plain.structure
     ))
 }
 
@@ -158,52 +136,32 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
 }
 
 /// A point of a figure, if it has a time and an error.
-fn measured<E>(
-    point: &Point<E>,
-    test: &str,
-    error: Option<Rate>,
-    is_cross: bool,
-    note: String,
-) -> Option<Measured> {
+fn measured(point: &Point) -> Option<Measured> {
+    let (errors, missed) = (&point.errors, missed(point));
+    let (name, time) = (named(point), text::some(point.query_ns(), text::time));
+    let (rate, extra) = (errors.excess?, percent(errors.excess));
     Some(Measured {
         structure: point.structure.clone(),
-        test: test.to_owned(),
+        test: errors.names.test.to_owned(),
         point: diagram::Point {
-            at: [point.query_ns()?, error?.value * 100.0],
-            ends: error.and_then(|rate| Some([rate.lower? * 100.0, rate.upper? * 100.0])),
+            at: [point.query_ns()?, rate.value * 100.0],
+            ends: rate
+                .lower
+                .zip(rate.upper)
+                .map(|(low, high)| [low * 100.0, high * 100.0]),
             wide: point.time.and_then(ends),
-            note,
-            is_cross,
+            note: format!("{name}: {time}, false positives {extra} %, {missed} missed"),
+            is_cross: missed > 0,
             is_large: point.on_front,
         },
     })
 }
 
-fn of(point: &CullingPoint) -> Option<Measured> {
-    let (errors, missed) = (&point.errors, missed(point));
-    let (name, time) = (named(point), text::some(point.query_ns(), text::time));
-    let extra = percent(errors.excess);
-    let note = format!("{name}: {time}, false positives {extra} %, {missed} missed");
-    measured(point, errors.names.test, errors.excess, missed > 0, note)
-}
-
-fn of_region(point: &Point<RegionErrors>) -> Option<Measured> {
-    let errors = &point.errors;
-    let note = format!("{} {}", point.structure, errors.numbers);
-    let is_cross = errors.missed_region_count > 0;
-    measured(point, errors.numbers, errors.wrong, is_cross, note)
-}
-
-/// Frustum queries, then region search where it was measured.
-pub fn figures(precision: &Precision) -> Vec<Figure> {
-    let about = format!("{}, {}", precision.scene, precision.path);
-    let caption = format!("{about}: error against run time; dashed: misses visible items");
+/// False positives against time; `None` without any point.
+pub fn figure(p: &Precision) -> Option<Figure> {
+    let (scene, path) = (&p.scene, &p.path);
+    let caption = format!("{scene}, {path}: error against run time; dashed: misses visible items");
     let axes = ["time per query", "false positives, % of visible"];
-    let points = precision.points.iter().filter_map(of);
-    let queries = against(&caption, axes, 3e-5, points.collect());
-    let caption = format!("{about}: region search; dashed: misses regions");
-    let axes = ["time per point", "points with a wrong answer, %"];
-    let points = precision.region_points.iter().filter_map(of_region);
-    let regions = against(&caption, axes, 3e-3, points.collect());
-    queries.into_iter().chain(regions).collect()
+    let points = p.points.iter().filter_map(measured);
+    against(&caption, axes, 3e-5, points.collect())
 }

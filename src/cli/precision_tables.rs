@@ -4,18 +4,13 @@
 use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
-use crate::precision::{
-    CullingErrors, Names, Point, Precision, RegionErrors, SWEEPS, SizeRow, SweepRow,
-};
+use crate::precision::{Names, Point, Precision, SWEEPS, SizeRow, SweepRow};
 use crate::report::grouped;
 use crate::statistics::Rate;
 
-/// A structure with a culling.
-pub type CullingPoint = Point<CullingErrors>;
-
 /// The Pareto front within `room` characters.
 ///
-/// With `all` every point, region search and the sweeps too.
+/// With `all` every point and the sweeps too.
 pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
@@ -49,10 +44,6 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         gone => format!(" Columns that do not fit here: {gone}."),
     };
     add(title, front, &(FRONT_NOTE.to_owned() + &gone));
-    if all {
-        let title = "Region search, the fastest structure for each";
-        add(title, regions_table(p), "");
-    }
     if all && !p.size_sweep.is_empty() {
         let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
         let note = sizes_note(&p.size_sweep);
@@ -89,12 +80,12 @@ const FRONT_NOTE: &str = "No other point is significantly better in an error, th
      of the conservative epsilon. FP: false positives, % of the visible items; FN: visible items \
      missed, millionths; <: none observed, 95 % upper bound.";
 
-pub fn named(point: &CullingPoint) -> String {
+pub fn named(point: &Point) -> String {
     format!("{} with {}", structure(point), culling(point))
 }
 
 /// A culling in short.
-fn culling(point: &CullingPoint) -> String {
+fn culling(point: &Point) -> String {
     let names = &point.errors.names;
     format!("{} {}", names.test, numbers(names))
 }
@@ -111,9 +102,9 @@ pub fn numbers(names: &Names) -> String {
 
 /// The first point of each culling, in their order by test; points come fastest
 /// first.
-fn fastest(points: &[CullingPoint]) -> Vec<&CullingPoint> {
+fn fastest(points: &[Point]) -> Vec<&Point> {
     let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
-    let mut found: Vec<&CullingPoint> = all.iter().map(|(_, own)| own[0]).collect();
+    let mut found: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
     found.sort_by_key(|p| (p.errors.names.test, culling(p)));
     found
 }
@@ -122,8 +113,8 @@ pub fn percent(rate: Option<Rate>) -> String {
     text::rate(rate, 100.0)
 }
 
-fn errors_table(points: &[&CullingPoint]) -> Table {
-    let columns: &[Column<&&CullingPoint>] = &[
+fn errors_table(points: &[&Point]) -> Table {
+    let columns: &[Column<&&Point>] = &[
         ("culling", |p| culling(p)),
         (">FP %", |p| percent(p.errors.excess)),
         (">by source", |p| some(p.errors.counts, text::sources)),
@@ -134,8 +125,8 @@ fn errors_table(points: &[&CullingPoint]) -> Table {
     Table::with(points, columns)
 }
 
-fn times_table(points: &[&CullingPoint]) -> Table {
-    let columns: &[Column<&&CullingPoint>] = &[
+fn times_table(points: &[&Point]) -> Table {
+    let columns: &[Column<&&Point>] = &[
         ("front", |p| mark(p.on_front, p.is_tie).to_owned()),
         ("culling", |p| culling(p)),
         ("structure", |p| structure(p)),
@@ -155,7 +146,7 @@ fn mark(on_front: bool, is_tie: bool) -> &'static str {
 }
 
 fn front_table(p: &Precision) -> Table {
-    let columns: &[Column<&CullingPoint>] = &[
+    let columns: &[Column<&Point>] = &[
         ("structure", |p| structure(p)),
         ("culling", |p| culling(p)),
         (">query", |p| time_plus_minus(p.time)),
@@ -169,26 +160,9 @@ fn front_table(p: &Precision) -> Table {
 }
 
 /// The structure without its parameters.
-fn structure(point: &CullingPoint) -> String {
+fn structure(point: &Point) -> String {
     let name = point.structure.split(':').next();
     name.unwrap_or_default().to_owned()
-}
-
-/// The fastest point of each kind of numbers.
-fn regions_table(p: &Precision) -> Table {
-    let all = grouped(p.region_points.iter().map(|p| (p.errors.numbers, p)));
-    let columns: &[Column<&Point<RegionErrors>>] = &[
-        ("front", |r| mark(r.on_front, r.is_tie).to_owned()),
-        ("numbers", |r| r.errors.numbers.to_owned()),
-        ("structure", |r| r.structure.clone()),
-        (">points", |r| r.errors.points.to_string()),
-        (">wrong %", |r| percent(r.errors.wrong)),
-        (">false", |r| r.errors.false_region_count.to_string()),
-        (">missed", |r| r.errors.missed_region_count.to_string()),
-        (">farthest", |r| significant(r.errors.worst_false)),
-        (">per point", |r| time_plus_minus(r.time)),
-    ];
-    Table::with(all.iter().map(|(_, own)| own[0]), columns)
 }
 
 /// Percent, with how far another seed may come out.

@@ -18,7 +18,7 @@ use crate::statistics::{Rate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
 pub struct Names {
     /// Name of the culling test.
     pub test: &'static str,
@@ -42,7 +42,7 @@ impl Names {
 }
 
 /// Errors of a culling over all cameras, and what it costs per item.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct CullingErrors {
     /// Test, arithmetic and planes.
     #[serde(flatten)]
@@ -180,7 +180,7 @@ impl Judged {
     }
 
     /// The culling's errors as a point of a structure, without a time.
-    pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
+    pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point {
         let is_judged = self.refused.is_none();
         let judged = if is_judged { &self.by_camera[..] } else { &[] };
         let known = || judged.iter();

@@ -1,18 +1,16 @@
 //! Error against run time: what each culling test, arithmetic and derivation
 //! of the planes gets wrong, and what it costs on each structure. It owns the
-//! points of that diagram and of region search's, and the sweeps; the truth is the
-//! oracle's, the clock is `measure`'s.
+//! points of that diagram and the sweeps; the truth is the oracle's, the clock is
+//! `measure`'s.
 
 mod judged;
 mod point;
 mod points;
-mod region_search;
 mod size_sweep;
 mod sweeps;
 
-pub use judged::{CullingErrors, Names};
+pub use judged::Names;
 pub use point::Point;
 pub use points::{Precision, prepare, time};
-pub use region_search::RegionErrors;
 pub use size_sweep::{SizeRow, size_sweep};
 pub use sweeps::{SWEEPS, SweepRow, sweep};

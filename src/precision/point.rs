@@ -1,9 +1,10 @@
-//! A point of a diagram: a structure, its queries, its errors and its time.
+//! A point of the diagram: a structure with a culling, its errors and its time.
 //!
 //! Also when one point dominates another.
 
 use serde::Serialize;
 
+use super::judged::CullingErrors;
 use crate::measure::{OverProcesses, Status, Verdict};
 use crate::statistics::{ALPHA, Estimate, dominance, flat, shows_less};
 
@@ -35,14 +36,14 @@ impl Dimension {
     }
 }
 
-/// One way to answer, with its errors `E` and its time.
+/// A structure with a culling, its errors and its time.
 #[derive(Clone, Debug, Serialize)]
-pub struct Point<E> {
+pub struct Point {
     /// Label of the structure.
     pub structure: String,
-    /// Queries and their errors.
+    /// The culling and its errors.
     #[serde(flatten)]
-    pub errors: E,
+    pub errors: CullingErrors,
     /// How building, counting and timing ended.
     pub status: Status,
     /// Why, where the status is not ok.
@@ -64,9 +65,9 @@ pub struct Point<E> {
     task: Option<usize>,
 }
 
-impl<E> Point<E> {
-    /// One without a time. The dimensions are the same for all points of a diagram.
-    pub(super) fn new(structure: &str, errors: E, dimensions: Vec<Dimension>) -> Point<E> {
+impl Point {
+    /// One without a time.
+    pub(super) fn new(structure: &str, errors: CullingErrors, dimensions: Vec<Dimension>) -> Point {
         Point {
             structure: structure.to_owned(),
             errors,
@@ -89,10 +90,10 @@ impl<E> Point<E> {
         wrong.is_none()
     }
 
-    /// Takes over the time of a task, divided by `per`, or why it has none.
-    pub(super) fn time(&mut self, times: &OverProcesses, task: usize, per: f64) {
+    /// Takes over the time of a task, or why it has none.
+    pub(super) fn time(&mut self, times: &OverProcesses, task: usize) {
         self.accepts(times.failure(task));
-        self.time = times.ns(task).map(|ns| ns.per(per));
+        self.time = times.ns(task);
         self.task = self.time.map(|_| task);
     }
 
@@ -110,8 +111,8 @@ impl<E> Point<E> {
 
 /// Sorts the points by time, what has none last, and marks the front of the others:
 /// errors are compared camera by camera, times process by process.
-pub(super) fn sort_and_mark<E>(points: &mut [Point<E>], is_faster: &dyn Fn(usize, usize) -> bool) {
-    let order = |p: &Point<E>| p.query_ns().unwrap_or(f64::INFINITY);
+pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usize) -> bool) {
+    let order = |p: &Point| p.query_ns().unwrap_or(f64::INFINITY);
     points.sort_by(|a, b| order(a).total_cmp(&order(b)));
     let timed = points.partition_point(|p| p.time.is_some());
     let values: Vec<Vec<f64>> = points[..timed].iter().map(Point::values).collect();
@@ -142,7 +143,7 @@ mod tests {
 
     /// A point with false negatives, dropped touches and false positives, each the
     /// same number at four cameras, the depth of its worst miss, its memory and time.
-    fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point<()> {
+    fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point {
         let sampled = |value: f64| Dimension::of([value / 4.0; 4].into_iter(), f64::add);
         let mut dimensions = errors.map(sampled).to_vec();
         dimensions.push(Dimension {
@@ -150,17 +151,17 @@ mod tests {
             by_camera: vec![0.0; 4],
         });
         dimensions.push(Dimension::fixed(memory));
-        let mut point = Point::new("linear", (), dimensions);
+        let mut point = Point::new("linear", CullingErrors::default(), dimensions);
         point.time = ns.map(Estimate::exact);
         point.task = ns.map(|ns| ns as usize);
         point
     }
 
     /// Times in steps of ten are told apart, those within a step are not.
-    fn marked(points: &[Point<()>]) -> Vec<(Option<usize>, bool, bool)> {
+    fn marked(points: &[Point]) -> Vec<(Option<usize>, bool, bool)> {
         let mut points = points.to_vec();
         sort_and_mark(&mut points, &|a, b| a / 10 < b / 10);
-        let of = |p: &Point<()>| (p.dominated_by, p.is_tie, p.on_front);
+        let of = |p: &Point| (p.dominated_by, p.is_tie, p.on_front);
         points.iter().map(of).collect()
     }
 

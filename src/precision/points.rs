@@ -1,12 +1,10 @@
-//! Points of the diagrams of one scene and path: every structure with every
-//! culling, checked, judged against the exact truth, and timed side by side; and region
-//! search likewise.
+//! Points of the diagram of one scene and path: every structure with every
+//! culling, checked, judged against the exact truth, and timed side by side.
 
 use serde::Serialize;
 
-use super::judged::{CullingErrors, Judged, Shots, Truths};
+use super::judged::{Judged, Shots, Truths};
 use super::point::{Point, sort_and_mark};
-use super::region_search::{POINTS_PER_CAMERA, RegionErrors, RegionNumbers, RegionQueries};
 use super::size_sweep::SizeRow;
 use super::sweeps::SweepRow;
 use crate::camera::{PLANE_METHODS, PlaneOptions};
@@ -14,7 +12,6 @@ use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
     OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_for,
-    input_of,
 };
 use crate::query::ItemId;
 use crate::scene::Scene;
@@ -40,11 +37,9 @@ pub struct Precision {
     /// time, / time of itself: a check whose interval is to hold 1.
     pub twin: Option<Estimate>,
     /// Fastest first; what could not be measured comes last.
-    pub points: Vec<Point<CullingErrors>>,
+    pub points: Vec<Point>,
     /// Indices of the points that nothing dominates, fastest first.
     pub front: Vec<usize>,
-    /// The other diagram: where is the camera. Fastest first.
-    pub region_points: Vec<Point<RegionErrors>>,
     /// Items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
     /// Warnings about the cameras in the scene.
@@ -59,8 +54,7 @@ pub struct Precision {
 
 /// The timed tasks, the same in every process.
 ///
-/// Their indices among all ways, those of the first diagram and then those of the other;
-/// true if the same is timed a second time, as a check.
+/// Their indices among all points; true if the same is timed a second time, as a check.
 pub type PointPlan = StudyPlan<(usize, bool)>;
 
 /// All points, checked and judged, but not timed.
@@ -92,13 +86,11 @@ fn cullings() -> Vec<Culling> {
     all
 }
 
-/// A structure over the boxes, over the cubes of the sphere test, and over the
-/// regions where those are other boxes.
+/// A structure over the boxes, and over the cubes of the sphere test.
 struct Indexes<'a> {
     structure: &'a str,
     boxes: Box<dyn DynIndex>,
     cubes: Box<dyn DynIndex>,
-    regions: Option<Box<dyn DynIndex>>,
 }
 
 impl<'a> Indexes<'a> {
@@ -107,14 +99,10 @@ impl<'a> Indexes<'a> {
             let items = test.items(&scene.items);
             spec.build(input_for(test, scene, &items))
         };
-        let regions = scene.regions.boxes(&scene.items);
-        let others = !std::ptr::eq(regions, &scene.items[..]);
-        let others = others.then(|| spec.build(input_of(scene, regions)));
         Ok(Indexes {
             structure: &spec.label,
             boxes: over(CullingTest::SixPlane)?,
             cubes: over(CullingTest::Sphere)?,
-            regions: others.transpose()?,
         })
     }
 
@@ -124,10 +112,6 @@ impl<'a> Indexes<'a> {
             _ => self.boxes.as_ref(),
         }
     }
-
-    fn regions(&self) -> &dyn DynIndex {
-        self.regions.as_deref().unwrap_or(self.boxes.as_ref())
-    }
 }
 
 /// Everything that points are made of, the same in every process.
@@ -136,16 +120,13 @@ struct Built<'a> {
     structures: Vec<Indexes<'a>>,
     /// Structures that refuse the items, and are left out.
     refused: Vec<&'a str>,
-    queries: RegionQueries<'a>,
 }
 
-/// One way to answer the queries of a diagram.
+/// A structure with a culling.
 #[derive(Clone, Copy)]
-enum Way<'b> {
-    /// A structure with a culling.
-    Culling(&'b Indexes<'b>, &'b Judged),
-    /// Region search by a structure, or by a loop over all regions.
-    Region(Option<&'b Indexes<'b>>, RegionNumbers),
+struct Way<'b> {
+    indexes: &'b Indexes<'b>,
+    judged: &'b Judged,
 }
 
 impl<'a> Built<'a> {
@@ -170,47 +151,32 @@ impl<'a> Built<'a> {
             judged: cullings().into_iter().map(judge).collect(),
             structures: built,
             refused,
-            queries: RegionQueries::new(scene, shots),
         })
     }
 
-    /// All ways to cull, then all ways to search for a region: f32 by every structure,
-    /// the other numbers by a loop, where the regions are their boxes.
+    /// Every structure with every culling.
     fn ways(&self) -> Vec<Way<'_>> {
-        use RegionNumbers::{Checked, Exact, F32, F64};
-        let structures = self.structures.iter();
-        let culled = structures.clone().flat_map(|indexes| {
+        let ways = self.structures.iter().flat_map(|indexes| {
             let judged = self.judged.iter();
-            judged.map(move |judged| Way::Culling(indexes, judged))
+            judged.map(move |judged| Way { indexes, judged })
         });
-        let searched = structures.map(Some);
-        let searched = searched.flat_map(|own| [F32, Checked].map(|n| Way::Region(own, n)));
-        let scans = [F64, Exact].map(|numbers| Way::Region(None, numbers));
-        let is_fair = |way: &Way| !matches!(way, Way::Region(_, n) if !self.queries.compares(*n));
-        let searched = searched.chain(scans).filter(is_fair);
-        culled.chain(searched).collect()
+        ways.collect()
     }
+}
 
+impl Way<'_> {
     /// Appends the answer to the query of a camera.
-    fn answer(&self, way: Way, camera: usize, out: &mut Vec<ItemId>) {
-        match way {
-            Way::Culling(indexes, judged) => {
-                let index = indexes.of(judged.culling.test);
-                index.query(judged.views[camera].as_any(), out);
-            }
-            Way::Region(indexes, numbers) => {
-                let index = indexes.map(Indexes::regions);
-                self.queries.answer((numbers, index), camera, out);
-            }
-        }
+    fn answer(self, camera: usize, out: &mut Vec<ItemId>) {
+        let index = self.indexes.of(self.judged.culling.test);
+        index.query(self.judged.views[camera].as_any(), out);
     }
 
-    /// Compares the answers of a way to cull with those of the plain loop.
-    fn check(&self, way: Way, judged: &Judged, items: usize) -> Result<(), Verdict> {
+    /// Compares the answers with those of the plain loop.
+    fn check(self, items: usize) -> Result<(), Verdict> {
         let mut trial = Trial::new(items);
-        for (n, answer) in judged.answers.iter().enumerate() {
+        for (n, answer) in self.judged.answers.iter().enumerate() {
             trial.expect(answer.iter().copied());
-            if let Err(fault) = trial.ask(|out| self.answer(way, n, out)) {
+            if let Err(fault) = trial.ask(|out| self.answer(n, out)) {
                 let place = "not the scan of its own planes: ";
                 let mut verdict = Verdict::of(&fault, place, |_| None);
                 if verdict.status == Status::Unsafe {
@@ -240,44 +206,24 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     let shots = Shots::of(path, most);
     let cameras = shots.cameras.len();
     let built = Built::new(setting, &shots, Some(&shots.truths(scene)))?;
-    let region_judged = built.queries.judged();
-    let (mut points, mut region_points) = (Vec::new(), Vec::new());
-    let (mut tasks, mut twin) = (Vec::new(), None);
+    let (mut points, mut tasks, mut twin) = (Vec::new(), Vec::new(), None);
     for (index, way) in built.ways().into_iter().enumerate() {
-        let (is_sound, answers) = match way {
-            Way::Culling(indexes, judged) => {
-                let test = judged.culling.test;
-                let memory = indexes.of(test).memory().total() as f64 / items as f64;
-                let mut point = judged.point(indexes.structure, memory);
-                let is_made = judged.refused.is_none();
-                let is_sound =
-                    is_made && point.accepts(built.check(way, judged, items).err().as_ref());
-                points.push(point);
-                (is_sound, &judged.answers)
-            }
-            Way::Region(indexes, numbers) => {
-                let judged = &region_judged[numbers as usize];
-                let mut point = judged.point(indexes.map_or("scan", |own| own.structure));
-                let agrees = built.queries.agree(judged, indexes.map(Indexes::regions));
-                let other = || Verdict::new(Status::Wrong, "other regions");
-                let is_sound = point.accepts((!agrees).then(other).as_ref());
-                region_points.push(point);
-                (is_sound, &judged.answers)
-            }
-        };
+        let Way { indexes, judged } = way;
+        let memory = indexes.of(judged.culling.test).memory().total() as f64 / items as f64;
+        let mut point = judged.point(indexes.structure, memory);
+        let is_made = judged.refused.is_none();
+        let is_sound = is_made && point.accepts(way.check(items).err().as_ref());
+        points.push(point);
         if !is_sound {
             continue;
         }
-        let built = &built;
         let task = |is_twin| {
-            let expected = answers.iter().map(|ids| ids.len() as u64).collect();
-            let ask = move |n: usize, out: &mut Vec<ItemId>| built.answer(way, n, out);
+            let expected = judged.answers.iter().map(|ids| ids.len() as u64).collect();
+            let ask = move |n: usize, out: &mut Vec<ItemId>| way.answer(n, out);
             ((index, is_twin), TimedTask::new(expected, ask))
         };
         tasks.push(task(false));
-        if let Way::Culling(_, judged) = way
-            && judged.culling == Culling::default()
-        {
+        if judged.culling == Culling::default() {
             twin.get_or_insert_with(|| task(true));
         }
     }
@@ -294,7 +240,6 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
             cameras,
             rounds: plan.schedule.rounds as usize,
             points,
-            region_points,
             skipped_items: scene.skipped_items,
             warnings,
             ..Precision::default()
@@ -313,10 +258,10 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
 pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
     let shots = Shots::of(&setting.path, most);
     let built = Built::new(setting, &shots, None)?;
-    let (built, ways) = (&built, built.ways());
+    let ways = built.ways();
     let timed = plan.timed(&setting.protocol, |&(way, _)| {
         let way = ways[way];
-        Box::new(move |n, out| built.answer(way, n, out))
+        Box::new(move |n, out| way.answer(n, out))
     });
     Ok(ProcessTimes::of(&timed))
 }
@@ -332,20 +277,17 @@ impl Prepared {
         for (task, (way, is_twin)) in keys.enumerate() {
             if is_twin {
                 precision.twin = original(way).and_then(|own| times.ratio(task, own));
-            } else if let Some(point) = precision.points.get_mut(way) {
-                point.time(&times, task, 1.0);
+            } else {
+                let point = &mut precision.points[way];
+                point.time(&times, task);
                 let ns = point.query_ns();
                 point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
-            } else {
-                let point = &mut precision.region_points[way - precision.points.len()];
-                point.time(&times, task, POINTS_PER_CAMERA as f64);
             }
         }
         let is_faster = |a: usize, b: usize| times.is_faster(a, b);
         let points = &mut precision.points;
         sort_and_mark(points, &is_faster);
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
-        sort_and_mark(&mut precision.region_points, &is_faster);
         precision.processes = processes.len();
         precision
     }

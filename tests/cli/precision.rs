@@ -1,6 +1,6 @@
 //! `precision`: the fields of its JSON, every combination once, errors that
 //! belong to the culling and not to the structure, dominance as documented,
-//! region search, the sweeps against published and plain expectations, tables that
+//! the sweeps against published and plain expectations, tables that
 //! fit, and refusals. No time is judged.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,8 +47,8 @@ fn culling(point: &Value) -> String {
 #[test]
 fn json_has_the_documented_fields() {
     let outcome = small();
-    let top = "scene path items skipped_items cameras processes rounds twin points front region_points \
-               seed size_sweep sweeps warnings";
+    let top = "scene path items skipped_items cameras processes rounds twin points front seed \
+                size_sweep sweeps warnings";
     assert_eq!(keys(outcome), set(top));
     assert_eq!(
         (&outcome["scene"], &outcome["path"]),
@@ -68,9 +68,6 @@ fn json_has_the_documented_fields() {
          {errors} worst_miss_px query_ns query_ns_lower query_ns_upper ns_per_item \
          memory_bytes_per_item dominated_by is_tie on_front"
     );
-    let region = "structure numbers status reason wrong points false_region_count \
-                  missed_region_count worst_false query_ns query_ns_lower query_ns_upper \
-                  dominated_by is_tie on_front";
     let size = "size_over_depth frusta cubes visible tests";
     let size_error = "test excess false_negative_count";
     let swept = format!(
@@ -79,7 +76,6 @@ fn json_has_the_documented_fields() {
     let rate = "value lower upper elsewhere";
     for (name, fields) in [
         ("points", point.as_str()),
-        ("region_points", region),
         ("size_sweep", size),
         ("sweeps", swept.as_str()),
     ] {
@@ -97,7 +93,7 @@ fn json_has_the_documented_fields() {
     }
     // Every field has a line in the documentation.
     let told = include_str!("../../docs/METHODOLOGY.md");
-    let fields = format!("{top} {point} {region} {size} {size_error} {swept} {rate}");
+    let fields = format!("{top} {point} {size} {size_error} {swept} {rate}");
     for field in set(&fields) {
         assert!(told.contains(&format!("`{field}`")), "{field}");
     }
@@ -257,47 +253,6 @@ fn rows_are_sorted_and_dominance_is_what_it_says() {
             "{point}"
         );
     }
-}
-
-#[test]
-fn region_search_is_a_diagram_of_its_own() {
-    let points = array(small(), "region_points");
-    let of = |structure: &str| -> BTreeSet<&str> {
-        let own = points.iter().filter(|p| p["structure"] == structure);
-        own.map(|p| p["numbers"].as_str().expect("text")).collect()
-    };
-    for structure in ["linear", "bvh"] {
-        assert_eq!(of(structure), BTreeSet::from(["f32", "f32 + check"]));
-    }
-    assert_eq!(of("scan"), BTreeSet::from(["f64", "exact"]));
-    for point in points {
-        assert_eq!(point["status"], "ok", "{point}");
-        assert_eq!(number(point, "points"), 4.0 * 16.0);
-        assert_eq!(number(point, "missed_region_count"), 0.0, "{point}");
-        let is_exact = point["numbers"] == "exact" || point["numbers"] == "f32 + check";
-        let extra = number(point, "false_region_count");
-        assert!(!is_exact || extra == 0.0, "{point}");
-        assert_eq!(extra > 0.0, rate(point, "wrong") > 0.0, "{point}");
-        assert_eq!(extra > 0.0, number(point, "worst_false") > 0.0, "{point}");
-    }
-    let f32s = points.iter().filter(|p| p["numbers"] == "f32");
-    assert!(
-        f32s.map(|p| number(p, "false_region_count"))
-            .all(|n| n > 0.0)
-    );
-    assert!(points.iter().any(|p| p["on_front"] == true));
-}
-
-/// Boxes of a map's leaves hold points that the leaves do not: no error of f32.
-#[test]
-fn region_search_in_maps_is_checked_or_exact() {
-    let line = "precision --scene freedm-map12 --path places --frames 2 --cubes 0 --processes 1 \
-                --structure linear --format json";
-    let outcome = json(&works(Path::new("."), line));
-    let points = array(&outcome, "region_points").iter();
-    let numbers: Vec<_> = points.map(|p| p["numbers"].as_str()).collect();
-    assert_eq!(numbers.len(), 2);
-    assert!(numbers.contains(&Some("f32 + check")) && numbers.contains(&Some("exact")));
 }
 
 #[test]
