@@ -70,8 +70,7 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
 /// Explanation of the errors.
 const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none observed, 95 % upper \
      bound 3/n. FP: false positives, % of the visible items; by source: storage/planes/test, of all \
-     cameras. px: how deep the deepest miss reaches into a view 1080 pixels high. Flicker: items \
-     that change between successive cameras of the path while their truth does not, of the visible. \
+     cameras. px: how deep the deepest miss reaches into a view 1080 pixels high. \
      c is the factor of the conservative epsilon. All structures have the same errors.";
 
 /// Meaning of the front.
@@ -120,7 +119,6 @@ fn errors_table(points: &[&Point]) -> Table {
         (">by source", |p| some(p.errors.counts, text::sources)),
         (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
         (">px", |p| some(p.errors.worst_miss_px, significant)),
-        (">flicker %", |p| percent(p.errors.flicker)),
     ];
     Table::with(points, columns)
 }

@@ -51,9 +51,6 @@ pub struct CullingErrors {
     pub excess: Option<Rate>,
     /// Visible items that were not returned, in millionths.
     pub false_negative_ppm: Option<Rate>,
-    /// Items that change from a camera to its neighbour on the path while their
-    /// truth does not / visible items; null for a path of one camera.
-    pub flicker: Option<Rate>,
     /// The same as counts; null for what is refused.
     #[serde(flatten, serialize_with = "counts_or_null")]
     pub counts: Option<ErrorCount>,
@@ -76,37 +73,11 @@ pub(super) fn counts_or_null<S: Serializer>(
     serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
 }
 
-/// Cameras to test, evenly spread over a path, each with its successor on the path.
-///
-/// The successors show changes from frame to frame.
-pub(super) struct Shots {
-    pub cameras: Vec<Camera>,
-    /// In the same order; the last camera of the path has none.
-    neighbours: Vec<Camera>,
+/// Cameras to test, evenly spread over a path.
+pub(super) fn chosen(path: &CameraPath, most: usize) -> Vec<Camera> {
+    let chosen = evenly(path.cameras.len(), most.max(1));
+    chosen.map(|i| path.cameras[i]).collect()
 }
-
-impl Shots {
-    pub fn of(path: &CameraPath, most: usize) -> Shots {
-        let count = path.cameras.len();
-        let chosen = evenly(count, most.max(1));
-        let next = chosen.clone().map(|i| i + 1).filter(|i| *i < count);
-        Shots {
-            cameras: chosen.map(|i| path.cameras[i]).collect(),
-            neighbours: next.map(|i| path.cameras[i]).collect(),
-        }
-    }
-
-    /// O(cameras * items) verdicts of some 50 ns. A frame always makes a pose.
-    pub fn truths(&self, scene: &Scene) -> Truths {
-        [&self.cameras, &self.neighbours].map(|cameras| {
-            let truths = cameras.iter().filter_map(|c| Truth::of_scene(c, scene));
-            truths.collect()
-        })
-    }
-}
-
-/// The truth about each camera, and about each neighbour.
-pub(super) type Truths = [Vec<Truth>; 2];
 
 /// Errors of the answer to one camera.
 #[derive(Clone, Copy, Default)]
@@ -115,8 +86,6 @@ struct CameraErrors {
     /// How deep the deepest false negative reaches into the view, in pixels of
     /// 1080p; 0 if there is none, `None` for a matrix without rays.
     worst_miss_px: Option<f64>,
-    /// Items whose answer changes to the neighbour while their truth does not.
-    flicker: Option<u64>,
 }
 
 /// Answers of one culling to every camera, and their errors.
@@ -124,7 +93,7 @@ struct CameraErrors {
 pub(super) struct Judged {
     pub culling: Culling,
     pub views: Vec<CameraView>,
-    /// Ids of each camera; empty without a truth.
+    /// Ids of each camera that has a truth.
     pub answers: Vec<Vec<ItemId>>,
     by_camera: Vec<CameraErrors>,
     /// Why there are no such views.
@@ -132,76 +101,54 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Answers judged by the truth; the views alone where there is none.
-    pub fn new(scene: &Scene, shots: &Shots, truths: Option<&Truths>, culling: Culling) -> Judged {
+    /// Answers judged by the truth about each camera; the views alone without any.
+    pub fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Judged {
+        let around = scene.surroundings();
         let mut judged = Judged {
             culling,
             ..Judged::default()
         };
-        judged.refused = judged.judge(scene, shots, truths).err();
-        judged
-    }
-
-    fn judge(
-        &mut self,
-        scene: &Scene,
-        shots: &Shots,
-        truths: Option<&Truths>,
-    ) -> Result<(), String> {
-        let around = scene.surroundings();
-        let culling = self.culling;
+        let views = cameras.iter().map(|camera| culling.view(camera, &around));
+        match views.collect::<Result<_, _>>() {
+            Ok(views) => judged.views = views,
+            Err(error) => judged.refused = Some(error.to_string()),
+        }
         let items = culling.test.items(&scene.items);
-        let view_of = |camera: &Camera| culling.view(camera, &around).map_err(|e| e.to_string());
-        let answer = |view: &CameraView| -> Vec<ItemId> {
+        for ((camera, view), truth) in cameras.iter().zip(&judged.views).zip(truths) {
             let view = view.as_any();
-            scan(&items, |b| view.sees(b)).collect()
-        };
-        for camera in &shots.cameras {
-            self.views.push(view_of(camera)?);
-        }
-        let Some([truths, beside]) = truths else {
-            return Ok(());
-        };
-        for (i, (camera, truth)) in shots.cameras.iter().zip(truths).enumerate() {
-            let own = answer(&self.views[i]);
-            let pair = shots.neighbours.get(i).zip(beside.get(i));
-            let flicker = pair.and_then(|(neighbour, then)| {
-                let answer_then = answer(&view_of(neighbour).ok()?);
-                Some(flicker(items.len(), [truth, then], [&own, &answer_then]))
+            let answer: Vec<ItemId> = scan(&items, |b| view.sees(b)).collect();
+            judged.by_camera.push(CameraErrors {
+                counts: blamed(culling.test, truth.errors(&scene.items, &answer)),
+                worst_miss_px: worst_miss_px(camera, scene, truth, &answer),
             });
-            self.by_camera.push(CameraErrors {
-                counts: blamed(culling.test, truth.errors(&scene.items, &own)),
-                worst_miss_px: worst_miss_px(camera, scene, truth, &own),
-                flicker,
-            });
-            self.answers.push(own);
+            judged.answers.push(answer);
         }
-        Ok(())
+        judged
     }
 
     /// The culling's errors as a point of a structure, without a time.
     pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point {
+        let judged = &self.by_camera[..];
         let is_judged = self.refused.is_none();
-        let judged = if is_judged { &self.by_camera[..] } else { &[] };
-        let known = || judged.iter();
-        let counts: ErrorCount = known().map(|camera| camera.counts).sum();
-        let pairs = known().filter_map(|c| Some([c.flicker?, c.counts.visible]));
+        let counts: ErrorCount = judged.iter().map(|camera| camera.counts).sum();
         let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
-        let in_pixels = || known().filter_map(|c| c.worst_miss_px);
+        let in_pixels = || judged.iter().filter_map(|c| c.worst_miss_px);
         let errors = CullingErrors {
             names: Names::of(&self.culling),
             excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
             false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
-            flicker: rate_of(&pairs.collect::<Vec<_>>(), |pair| *pair),
             counts: is_judged.then_some(counts),
             worst_miss_px: in_pixels().reduce(f64::max),
             ns_per_item: None,
             memory_bytes_per_item,
         };
+        let of = |count: fn(&ErrorCount) -> u64| {
+            Dimension::of(judged.iter().map(|c| count(&c.counts) as f64), f64::add)
+        };
         let dimensions = vec![
-            Dimension::of(known().map(|c| c.counts.false_negatives as f64), f64::add),
-            Dimension::of(known().map(|c| c.counts.touch_dropped as f64), f64::add),
-            Dimension::of(known().map(|c| c.counts.false_positives as f64), f64::add),
+            of(|c| c.false_negatives),
+            of(|c| c.touch_dropped),
+            of(|c| c.false_positives),
             Dimension::of(in_pixels(), f64::max),
             Dimension::fixed(memory_bytes_per_item),
         ];
@@ -214,20 +161,6 @@ impl Judged {
         };
         point
     }
-}
-
-/// Items whose answer changes from one camera to another while the truth about
-/// them stays what it is.
-fn flicker(items: usize, truths: [&Truth; 2], answers: [&[ItemId]; 2]) -> u64 {
-    let mut changed = vec![false; items];
-    for &id in answers.into_iter().flatten() {
-        let slot = &mut changed[id as usize];
-        *slot = !*slot;
-    }
-    let [before, after] = truths.map(Truth::verdicts);
-    let verdicts = before.iter().zip(after).zip(changed);
-    let flickers = verdicts.filter(|((a, b), changed)| *changed && a == b);
-    flickers.count() as u64
 }
 
 /// How deep the deepest false negative reaches into the view, in pixels of a view
@@ -258,7 +191,7 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn a_miss_has_pixels_and_a_change_without_a_cause_is_flicker() {
+    fn a_miss_has_pixels() {
         // Ten high at a depth of ten: 108 pixels per unit there.
         let lens = Lens::perspective(2.0 * 0.5f64.atan().to_degrees(), 1.0, 1.0, Some(100.0));
         let camera = Camera {
@@ -290,17 +223,5 @@ mod tests {
         sheared[0][2] += 0.01;
         let sheared = Camera::of_matrix(sheared, MatrixConvention::ColumnD3d).unwrap();
         assert_eq!(worst(&sheared, &[2]), None);
-        // The second changes and is out both times, the first changes as well.
-        let count = |a: &[ItemId], b: &[ItemId]| flicker(3, [&truth, &truth], [a, b]);
-        assert_eq!(count(&[0, 2], &[0, 2]), 0);
-        assert_eq!(count(&[0, 1, 2], &[2]), 2);
-        let turned = Camera {
-            frame: look_at(DVec3::ZERO, -DVec3::X, DVec3::Z).unwrap(),
-            ..camera
-        };
-        let after = Truth::of_scene(&turned, &scene).unwrap();
-        // All truths change.
-        assert_eq!(flicker(3, [&truth, &after], [&[0, 2], &[1]]), 0);
-        assert_eq!(flicker(3, [&truth, &after], [&[0, 2], &[]]), 0);
     }
 }

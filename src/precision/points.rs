@@ -3,11 +3,11 @@
 
 use serde::Serialize;
 
-use super::judged::{Judged, Shots, Truths};
+use super::judged::{Judged, chosen};
 use super::point::{Point, sort_and_mark};
 use super::size_sweep::SizeRow;
 use super::sweeps::SweepRow;
-use crate::camera::{PLANE_METHODS, PlaneOptions};
+use crate::camera::{Camera, PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
@@ -16,7 +16,7 @@ use crate::measure::{
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
-use crate::verify::Trial;
+use crate::verify::{Trial, Truth};
 
 /// The diagram of a scene and path.
 #[derive(Clone, Default, Debug, Serialize)]
@@ -132,11 +132,11 @@ struct Way<'b> {
 impl<'a> Built<'a> {
     fn new(
         setting: &'a Setting,
-        shots: &Shots,
-        truths: Option<&Truths>,
+        cameras: &[Camera],
+        truths: &[Truth],
     ) -> Result<Built<'a>, BuildError> {
         let (scene, structures) = (&setting.scene, &setting.structures);
-        let judge = |culling| Judged::new(scene, shots, truths, culling);
+        let judge = |culling| Judged::new(scene, cameras, truths, culling);
         let (mut built, mut refused) = (Vec::new(), Vec::new());
         for spec in structures {
             match Indexes::new(spec, scene) {
@@ -195,17 +195,20 @@ impl Way<'_> {
 ///
 /// Every answer is compared with the plain loop before it is timed, and the
 /// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
-/// and as many plain tests for each culling, twice for what changes from frame to
-/// frame. Of the path at most `most` cameras are looked at, evenly spread.
+/// and as many plain tests for each culling. Of the path at most `most` cameras are
+/// looked at, evenly spread.
 ///
 /// # Errors
 /// A structure that refuses the scene.
 pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     let Setting { scene, path, .. } = setting;
     let items = scene.items.len();
-    let shots = Shots::of(path, most);
-    let cameras = shots.cameras.len();
-    let built = Built::new(setting, &shots, Some(&shots.truths(scene)))?;
+    let cameras = chosen(path, most);
+    // A frame always makes a pose.
+    let truths = cameras.iter().filter_map(|c| Truth::of_scene(c, scene));
+    let truths: Vec<Truth> = truths.collect();
+    let built = Built::new(setting, &cameras, &truths)?;
+    let cameras = cameras.len();
     let (mut points, mut tasks, mut twin) = (Vec::new(), Vec::new(), None);
     for (index, way) in built.ways().into_iter().enumerate() {
         let Way { indexes, judged } = way;
@@ -256,8 +259,7 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
 /// # Panics
 /// If the scene is not the one that was planned for.
 pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
-    let shots = Shots::of(&setting.path, most);
-    let built = Built::new(setting, &shots, None)?;
+    let built = Built::new(setting, &chosen(&setting.path, most), &[])?;
     let ways = built.ways();
     let timed = plan.timed(&setting.protocol, |&(way, _)| {
         let way = ways[way];

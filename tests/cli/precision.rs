@@ -64,7 +64,7 @@ fn json_has_the_documented_fields() {
     assert_eq!(keys(&outcome["twin"]), set("value lower upper"));
     let errors = ERRORS.join(" ");
     let point = format!(
-        "structure test arithmetic planes epsilon status reason excess false_negative_ppm flicker \
+        "structure test arithmetic planes epsilon status reason excess false_negative_ppm \
          {errors} worst_miss_px query_ns query_ns_lower query_ns_upper ns_per_item \
          memory_bytes_per_item dominated_by is_tie on_front"
     );
