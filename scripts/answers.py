@@ -125,8 +125,7 @@ def answers():
         found = json.loads(output("precision", "--scene", scene, "--cubes", "4000", "--processes", "1",
                                   "--format", "json"))
         point = ("test", "arithmetic", "planes", "epsilon")
-        for section, names in (("points", ("structure", *point)), ("sweeps", ("sweep", *point)),
-                               ("size_sweep", ("size_over_depth",))):
+        for section, names in (("points", ("structure", *point)), ("sweeps", ("sweep", *point))):
             for name, rows in rows_by(found[section], *names).items():
                 yield f"precision {scene} {section} {name}", rows
     found = json.loads(output("drift", "--steps", "1e3", "--processes", "1", "--seconds", "1", "--rate", "60",

@@ -298,7 +298,7 @@ pub struct PrecisionArgs {
     /// Number of cameras to use, evenly spread over the path
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
-    /// Cubes for each ratio of the size sweep; 0 skips all sweeps
+    /// Cubes for each size of the sweep over sizes; 0 skips all sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX))]
     pub cubes: usize,
     /// Show every table: all points, the sweeps

@@ -15,13 +15,7 @@ use super::text;
 use super::{Ending, expect_places, precision_conclusions, precision_tables, print, write_if};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Setting};
-use crate::precision::{self, Precision, SWEEPS, size_sweep, sweep};
-
-/// Cubes for each camera of the other sweeps, and the most cameras of each value.
-const CUBES_PER_CAMERA: usize = 10_000;
-const SWEEP_CAMERAS: usize = 200;
-/// Fewer cameras give no interval that holds, as items of one share its planes.
-const LEAST_CAMERAS: usize = 32;
+use crate::precision::{self, Precision, SWEEPS, sweep};
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -34,22 +28,17 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let prepared = precision::prepare(&setting, args.frames as usize)?;
     let items = text::counted(setting.scene.items.len(), "item");
     study.announce(&items, "about a minute");
-    let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
+    let mut sweeps = Vec::new();
     if args.cubes > 0 {
-        study.begin("the sweep over sizes");
-        sizes = size_sweep(args.cubes, spread.seed)?;
-        let cameras = args.cubes.div_ceil(CUBES_PER_CAMERA);
-        let cameras = cameras.clamp(LEAST_CAMERAS, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
             study.begin(&format!("the sweep over {name}"));
-            sweeps.extend(sweep(which, cameras, spread.seed));
+            sweeps.extend(sweep(which, which.cameras(args.cubes), spread.seed));
         }
     }
     let lens_scale = setting.path.lens_scale;
     let times = study.times("every point, timed", lens_scale, &prepared.plan)?;
     let outcome = Precision {
         seed: spread.seed,
-        size_sweep: sizes,
         sweeps,
         ..prepared.conclude(&times)
     };

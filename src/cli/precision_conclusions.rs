@@ -4,14 +4,14 @@
 use super::diagram;
 use super::error_figure::{Measured, against};
 use super::figure::{Figure, ends};
-use super::precision_tables::{elsewhere, named, numbers, percent, swept};
+use super::precision_tables::{culling, named, numbers, percent, swept};
 use super::text;
 use crate::measure::Status;
-use crate::precision::{Point, Precision, SWEEPS, SizeRow, SweepRow};
+use crate::precision::{Point, Precision, SWEEPS, Sweep, SweepRow};
 
 pub fn conclusions(p: &Precision) -> Vec<String> {
-    let (sizes, sweeps) = (of_sizes(&p.size_sweep), of_sweeps(&p.sweeps));
-    let others = [of_storage(p), sizes, sweeps].into_iter();
+    let (sizes, cameras) = (of_sizes(&p.sweeps), of_cameras(&p.sweeps));
+    let others = [of_storage(p), sizes, cameras].into_iter();
     of_points(p).into_iter().chain(others.flatten()).collect()
 }
 
@@ -91,33 +91,36 @@ fn of_storage(p: &Precision) -> Option<String> {
     ))
 }
 
-fn of_sizes(rows: &[SizeRow]) -> Option<String> {
-    let of = |row: &SizeRow, test: &str| {
-        let found = row.tests.iter().find(|t| t.test == test);
-        elsewhere(found.and_then(|t| t.excess))
+fn of_sizes(rows: &[SweepRow]) -> Option<String> {
+    let [small, .., large] = Sweep::Size.values();
+    let of = |size: f64, name: &str| {
+        let mut own = rows
+            .iter()
+            .filter(|row| row.sweep == Sweep::Size && row.value == size);
+        let found = own.find(|row| culling(&row.names) == name);
+        text::rate(found.and_then(SweepRow::error), 1.0)
     };
-    let (first, last) = (rows.first()?, rows.last()?);
-    let [planes, more] = [first, last].map(|row| of(row, "six-plane"));
-    let [exact, also] = [first, last].map(|row| of(row, "exact + epsilon"));
-    let [small, large] = [first, last].map(|row| row.size_over_depth);
-    let is_bounded = [&planes, &more, &exact, &also]
-        .iter()
-        .any(|s| s.contains('±'));
-    let bounds = ["", " (± bounds the result of another seed)"][usize::from(is_bounded)];
-    Some(format!(
-        "Six planes return {planes} % false positives where a cube's edge is {small} of the \
-         frustum's depth, and {more} % at {large}; the exact test with c = 8: {exact} and {also} %{bounds}."
-    ))
+    let [planes, more] = [small, large].map(|size| of(size, "six-plane f32 c=0"));
+    let [exact, also] = [small, large].map(|size| of(size, "exact f32 c=8"));
+    (!rows.is_empty()).then(|| {
+        format!(
+            "Six planes return {planes} % false positives where a cube's edge is {small} of the \
+             frustum's depth, and {more} % at {large}; the exact test with c = 8: {exact} and \
+             {also} %."
+        )
+    })
 }
 
-/// Misses of the default over the sweeps, and the most of any over each.
-fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
+/// Misses of the default over the sweeps of cameras, and the most of any over each.
+fn of_cameras(rows: &[SweepRow]) -> Option<String> {
     let lost = |row: &SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
-    let default = rows.iter().filter(|row| numbers(&row.names) == "f32 c=8");
+    let sweeps = SWEEPS.into_iter().filter(|sweep| sweep.0 != Sweep::Size);
+    let rows = rows.iter().filter(|row| row.sweep != Sweep::Size);
+    let default = rows.clone().filter(|row| numbers(&row.names) == "f32 c=8");
     let errors = default.filter_map(|row| row.errors);
     let missed: u64 = errors.map(|errors| errors.false_negatives).sum();
-    let worst = SWEEPS.iter().filter_map(|(sweep, name, _)| {
-        let own = rows.iter().filter(|row| row.sweep == *sweep);
+    let worst = sweeps.clone().filter_map(|(sweep, name, _)| {
+        let own = rows.clone().filter(|row| row.sweep == sweep);
         let worst = own.max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
         let (value, numbers) = (swept(worst.value), numbers(&worst.names));
         let lost = Some(lost(worst).round() as usize).filter(|_| lost(worst) > 0.0)?;
@@ -128,8 +131,8 @@ fn of_sweeps(rows: &[SweepRow]) -> Option<String> {
         none if none.is_empty() => "no other numbers do either".to_owned(),
         worst => format!("others miss items, most at {worst}"),
     };
-    (!rows.is_empty()).then(|| {
-        let names: Vec<&str> = SWEEPS.iter().map(|sweep| sweep.1).collect();
+    rows.clone().next().map(|_| {
+        let names: Vec<&str> = sweeps.map(|sweep| sweep.1).collect();
         let (names, missed) = (names.join(", "), text::counted(missed as usize, "item"));
         format!("Over {names} the default (six planes, f32 c=8) misses {missed}; {others}.")
     })

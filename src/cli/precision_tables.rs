@@ -4,7 +4,7 @@
 use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
-use crate::precision::{Names, Point, Precision, SWEEPS, SizeRow, SweepRow};
+use crate::precision::{Names, Point, Precision, SWEEPS, Sweep, SweepRow};
 use crate::report::grouped;
 use crate::statistics::Rate;
 
@@ -44,14 +44,14 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         gone => format!(" Columns that do not fit here: {gone}."),
     };
     add(title, front, &(FRONT_NOTE.to_owned() + &gone));
-    if all && !p.size_sweep.is_empty() {
-        let title = "False positives / visible, %, by cube edge s / depth D of the frustum";
-        let note = sizes_note(&p.size_sweep);
-        add(title, sizes_table(&p.size_sweep), &note);
+    if all && !p.sweeps.is_empty() {
         for (sweep, name, what) in SWEEPS {
             let rows = p.sweeps.iter().filter(|row| row.sweep == sweep);
             let (table, note) = swept_errors(&rows.collect::<Vec<_>>());
-            let title = format!("Missed visible items (ppm) by {name} ({what}), nothing rebased");
+            let title = match sweep {
+                Sweep::Size => format!("False positives (% of visible) by {name} ({what})"),
+                _ => format!("Missed visible items (ppm) by {name} ({what}), nothing rebased"),
+            };
             add(&title, table, &note);
         }
     }
@@ -80,12 +80,11 @@ const FRONT_NOTE: &str = "No other point is significantly better in an error, th
      missed, millionths; <: none observed, 95 % upper bound.";
 
 pub fn named(point: &Point) -> String {
-    format!("{} with {}", structure(point), culling(point))
+    format!("{} with {}", structure(point), culling(&point.errors.names))
 }
 
 /// A culling in short.
-fn culling(point: &Point) -> String {
-    let names = &point.errors.names;
+pub fn culling(names: &Names) -> String {
     format!("{} {}", names.test, numbers(names))
 }
 
@@ -104,7 +103,7 @@ pub fn numbers(names: &Names) -> String {
 fn fastest(points: &[Point]) -> Vec<&Point> {
     let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
     let mut found: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
-    found.sort_by_key(|p| (p.errors.names.test, culling(p)));
+    found.sort_by_key(|p| (p.errors.names.test, culling(&p.errors.names)));
     found
 }
 
@@ -114,7 +113,7 @@ pub fn percent(rate: Option<Rate>) -> String {
 
 fn errors_table(points: &[&Point]) -> Table {
     let columns: &[Column<&&Point>] = &[
-        ("culling", |p| culling(p)),
+        ("culling", |p| culling(&p.errors.names)),
         (">FP %", |p| percent(p.errors.excess)),
         (">by source", |p| some(p.errors.counts, text::sources)),
         (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
@@ -126,7 +125,7 @@ fn errors_table(points: &[&Point]) -> Table {
 fn times_table(points: &[&Point]) -> Table {
     let columns: &[Column<&&Point>] = &[
         ("front", |p| mark(p.on_front, p.is_tie).to_owned()),
-        ("culling", |p| culling(p)),
+        ("culling", |p| culling(&p.errors.names)),
         ("structure", |p| structure(p)),
         (">query", |p| time_plus_minus(p.time)),
         (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
@@ -146,7 +145,7 @@ fn mark(on_front: bool, is_tie: bool) -> &'static str {
 fn front_table(p: &Precision) -> Table {
     let columns: &[Column<&Point>] = &[
         ("structure", |p| structure(p)),
-        ("culling", |p| culling(p)),
+        ("culling", |p| culling(&p.errors.names)),
         (">query", |p| time_plus_minus(p.time)),
         (">FP %", |p| percent(p.errors.excess)),
         (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
@@ -163,37 +162,6 @@ fn structure(point: &Point) -> String {
     name.unwrap_or_default().to_owned()
 }
 
-/// Percent, with how far another seed may come out.
-pub fn elsewhere(rate: Option<Rate>) -> String {
-    some(rate.map(|rate| rate.per(100.0)), |rate| {
-        text::plus_minus(rate.value, rate.elsewhere)
-    })
-}
-
-/// Tests by ratios.
-fn sizes_table(rows: &[SizeRow]) -> Table {
-    let ratios = rows.iter().map(|row| row.size_over_depth.to_string());
-    let mut table = Table::of_numbers(["s/D".to_owned()].into_iter().chain(ratios));
-    let visible = rows.iter().map(|row| text::count(row.visible as usize));
-    table.add_row(["visible".to_owned()].into_iter().chain(visible));
-    for (i, test) in rows[0].tests.iter().enumerate() {
-        let excess = rows.iter().map(|row| elsewhere(row.tests[i].excess));
-        table.add_row([test.test.to_owned()].into_iter().chain(excess));
-    }
-    table
-}
-
-/// Basis of the table.
-fn sizes_note(rows: &[SizeRow]) -> String {
-    let first = &rows[0];
-    let frusta = text::count(first.frusta);
-    let cubes = text::counted(first.cubes as usize, "cube");
-    format!(
-        "Field of view 60 degrees, 16:9; {frusta} frusta and {cubes} for each ratio; ± bounds the \
-         result of another seed (99.999 %), from the spread over the frusta."
-    )
-}
-
 /// A value of a sweep: as a power of two where it is a large one.
 pub fn swept(value: f64) -> String {
     match value {
@@ -203,36 +171,41 @@ pub fn swept(value: f64) -> String {
     }
 }
 
-/// Table of the cullings that miss anything, and a line on the others.
+/// Table of the cullings that have any error, and a line on the others.
 fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
     let mut values: Vec<f64> = rows.iter().map(|row| row.value).collect();
     values.dedup();
-    let head = |value: &f64| swept(*value);
-    let header = ["six-plane".to_owned()].into_iter();
-    let mut table = Table::of_numbers(header.chain(values.iter().map(head)));
+    type Named = fn(&Names) -> String;
+    let ([header, nothing, unit], name): (_, Named) = match rows[0].sweep {
+        Sweep::Size => (["culling", "No false positives", "%"], culling),
+        // All are of one test.
+        _ => (["six-plane", "Nothing missed", "ppm"], numbers),
+    };
+    let head = values.iter().map(|value| swept(*value));
+    let mut table = Table::of_numbers([header.to_owned()].into_iter().chain(head));
     let (mut sound, mut bound) = (Vec::new(), 0.0);
     for kind in rows.iter().filter(|row| row.value == values[0]) {
         let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();
-        let is_sound = |row: &&&SweepRow| row.errors.is_some_and(|e| e.false_negatives == 0);
+        let is_sound = |row: &&&SweepRow| row.error().is_some_and(|rate| rate.value == 0.0);
         if own.iter().all(is_sound) {
-            sound.push(numbers(&kind.names));
-            let uppers = own.iter().filter_map(|row| row.false_negative_ppm?.upper);
+            sound.push(name(&kind.names));
+            let uppers = own.iter().filter_map(|row| row.error()?.upper);
             bound = uppers.fold(bound, f64::max);
             continue;
         }
-        let ppm = own.iter().map(|row| match &row.refused {
+        let errors = own.iter().map(|row| match &row.refused {
             Some(_) => "refused".to_owned(),
-            None => text::rate(row.false_negative_ppm, 1.0),
+            None => text::rate(row.error(), 1.0),
         });
-        let label = numbers(&kind.names);
+        let label = name(&kind.names);
         let is_named = kind.names.planes != "frame";
         let short = label.strip_prefix("f32 ").filter(|_| is_named);
         let label = short.unwrap_or(&label).to_owned();
-        table.add_row([label].into_iter().chain(ppm));
+        table.add_row([label].into_iter().chain(errors));
     }
     let sound = some(sound.first(), |_| {
         let (bound, sound) = (significant(bound), sound.join(", "));
-        format!("Nothing missed (below {bound} ppm): {sound}.")
+        format!("{nothing} (below {bound} {unit}): {sound}.")
     });
     (table, sound)
 }
@@ -240,11 +213,11 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::precision::{SWEEPS, sweep};
+    use crate::precision::sweep;
 
     #[test]
     fn what_nothing_missed_means_is_the_largest_bound() {
-        let mut rows = sweep(SWEEPS[0].0, 1, 1);
+        let mut rows = sweep(Sweep::Offset, 1, 1);
         let (first, last) = (rows[0].names, rows.last().expect("a row").names);
         assert_ne!(first, last);
         for (row, bound) in rows.iter_mut().zip([2.0, 1.0].into_iter().cycle()) {

@@ -6,11 +6,10 @@
 mod judged;
 mod point;
 mod points;
-mod size_sweep;
+mod size;
 mod sweeps;
 
 pub use judged::Names;
 pub use point::Point;
 pub use points::{Precision, prepare, time};
-pub use size_sweep::{SizeRow, size_sweep};
-pub use sweeps::{SWEEPS, SweepRow, sweep};
+pub use sweeps::{SWEEPS, Sweep, SweepRow, sweep};

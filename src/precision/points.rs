@@ -5,7 +5,6 @@ use serde::Serialize;
 
 use super::judged::{Judged, chosen};
 use super::point::{Point, sort_and_mark};
-use super::size_sweep::SizeRow;
 use super::sweeps::SweepRow;
 use crate::camera::{Camera, PLANE_METHODS, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
@@ -46,9 +45,7 @@ pub struct Precision {
     pub warnings: Vec<String>,
     /// Seed of the sweeps and of the order of the tasks.
     pub seed: u64,
-    /// False positives by the size of items; empty unless requested.
-    pub size_sweep: Vec<SizeRow>,
-    /// Missed items of ill-conditioned cameras; empty unless requested.
+    /// Errors by the size of items and of ill-conditioned cameras; empty unless requested.
     pub sweeps: Vec<SweepRow>,
 }
 
