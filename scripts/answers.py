@@ -128,15 +128,13 @@ def answers():
         for section, names in (("points", ("structure", *point)), ("sweeps", ("sweep", *point))):
             for name, rows in rows_by(found[section], *names).items():
                 yield f"precision {scene} {section} {name}", rows
-    found = json.loads(output("drift", "--steps", "1e3", "--processes", "1", "--seconds", "1", "--rate", "60",
-                              "--arm", "linear", "--format", "json"))
-    for section in ("rotation", "one_degree_turns"):
-        for name, rows in rows_by(found[section], "method").items():
+    found = json.loads(output("drift", "--steps", "1e3", "--processes", "1", "--format", "json"))
+    for section in ("rotation", "arm_methods"):
+        for name, rows in rows_by(found[section], "name").items():
             yield f"drift {section} {name}", rows
-    for row in found["arm"]["points"]:
-        yield f"drift arm {row['method']} {row['stiffness']} {row['substeps']}", [str(row["position_error"])]
-    for row in found["arm"]["stability"]:
-        yield f"drift stability {row['method']} {row['damping_ratio']}", [str(row["limit_omega_h"])]
+    for row in found["arm_points"]:
+        key = " ".join(str(row[name]) for name in ("arm", "method", "stiffness", "substeps"))
+        yield f"drift arm {key}", [str(row["position_error"])]
     for suite in ("quick", "standard", "full", "compare"):
         cells = output("run", "--suite", suite, "--structure", "linear,bvh", "--plan").splitlines()
         yield f"plan {suite}", cells

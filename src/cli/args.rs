@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::drift::DriftOptions;
+use crate::drift;
 use crate::spec::values;
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
@@ -333,9 +333,10 @@ pub struct AdviseArgs {
 
 #[derive(Args, Debug)]
 pub struct DriftArgs {
-    #[command(flatten)]
-    pub options: DriftOptions,
-    /// Show every table: errors by number of steps, orders, limits of stability
+    /// Number of steps of the camera bases
+    #[arg(long, value_name = "N", default_value = "1e6", value_parser = drift::steps)]
+    pub steps: u64,
+    /// Show every table: what methods do, times of arms, limits of stability
     #[arg(long)]
     pub all: bool,
     /// Also write the figures and all tables as one page

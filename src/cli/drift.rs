@@ -1,12 +1,10 @@
 //! `cullbench drift`: tables of the errors of camera bases and spring arms, of the
 //! cost of a step of each, and recommendations.
 
-use anyhow::ensure;
-
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, show};
-use super::figure::{Axis, Figure, Look, is_drawn, picture};
+use super::figure::{Axis, Figure, Look, ends, is_drawn, picture};
 use super::page::to_page;
 use super::processes::Timing;
 use super::study::{ROUNDS, Study};
@@ -14,45 +12,28 @@ use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_if};
 use crate::drift::{
-    self, ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, DriftReport, ORBIT_RADIUS, Rated,
-    Recommendation, RotationDrift, StabilityLimit,
+    self, ARM_TOLERANCE, ArmKind, ArmPoint, DriftReport, RATE_HZ, Rotation, SECONDS, STEADY,
+    Stability,
 };
 use crate::measure::ProcessTimes;
-use crate::report::grouped;
-
-/// Most steps of the reference behind one arm: about a minute.
-const MOST_STEPS: f64 = 1e9;
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     expect_places(&outputs, &[""; 0])?;
-    let options = &args.options;
-    let arms = &options.arms;
-    let stiffest = arms.stiffness.iter().copied().fold(0.0, f64::max);
-    let reference = drift::reference_steps(stiffest, arms.seconds);
-    ensure!(
-        reference <= MOST_STEPS,
-        "--stiffness {stiffest:e} over --seconds {}: {reference:.0e} steps of the reference; \
-         expected at most {MOST_STEPS:e}",
-        arms.seconds
-    );
-    let jobs = drift::jobs(options);
-    let study = Study::new(String::new(), jobs as u64, &args.spread)?;
-    let (steps, seconds) = (options.steps as f64, arms.seconds);
-    let work = text::counted(jobs, "study");
-    let work = format!("{work}, up to {steps:e} steps or {seconds} s each");
+    let study = Study::new(String::new(), 0, &args.spread)?;
+    let work = format!("{:e} steps, arms over {SECONDS} s", args.steps as f64);
     study.announce(&work, "about half a minute");
-    let mut report = drift::prepare(options, |job| {
-        study.begin(job);
-        study.advance();
-    });
-    let schedule = drift::plan(options, &args.spread.protocol(ROUNDS, 0));
+    study.begin("all errors");
+    let mut report = drift::prepare(args.steps);
+    let schedule = drift::plan(&args.spread.protocol(ROUNDS, 0));
     let times = study.times("everything, timed", None, &schedule)?;
     report.conclude(&times, schedule.rounds);
     print(args.format, &report, || show(&blocks(&report, args.all)))?;
-    write_if(&args.svg, || draw(&report.arm))?;
+    // A row per arm, a column per stiffness.
+    let columns = report.arm_choices.len() / ArmKind::ALL.len();
+    write_if(&args.svg, || picture(&arm_figures(&report), columns))?;
     write_if(&args.html, || {
-        let (told, figures) = (conclusions(&report), arm_figures(&report.arm));
+        let (told, figures) = (conclusions(&report), arm_figures(&report));
         to_page("drift", told, figures, tables(&report, true))
     })?;
     Ok(Ending::Ok)
@@ -61,15 +42,7 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
 /// Times everything in one process.
 pub fn time(args: &DriftArgs, timing: &Timing) -> anyhow::Result<ProcessTimes> {
     let protocol = args.spread.protocol(ROUNDS, timing.process);
-    Ok(drift::time(&args.options, &timing.plan()?, &protocol))
-}
-
-/// A number of steps.
-fn steps(count: u64) -> String {
-    match count < 1000 {
-        true => count.to_string(),
-        false => format!("{:e}", count as f64),
-    }
+    Ok(drift::time(&timing.plan()?, &protocol))
 }
 
 /// Two digits of something that spans many powers of ten.
@@ -85,176 +58,89 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     let mut blocks = tables(report, all);
     blocks.push(Block::heading("Conclusions:"));
     blocks.extend(conclusions(report));
-    let more = "errors by number of steps, orders, stability: --all";
+    let more = "what methods do, limits of stability: --all";
     blocks.extend(Block::more(all, more));
     blocks
 }
 
-/// The tables; with `all` the errors after each number of steps too.
+/// The tables; with `all` a line about each method and limits of stability too.
 fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
-    let [yaw, pitch, roll] = report.turn_per_step;
-    let (steps, rounds) = (steps(report.steps), text::counted(report.rounds, "round"));
-    let unit = ["steps", "step"][usize::from(report.steps == 1)];
+    let [yaw, pitch, roll] = STEADY;
+    let (steps, rounds) = (report.steps as f64, text::counted(report.rounds, "round"));
     let over = text::over(report.processes, None);
     let mut blocks = vec![
         Block::line(format!(
-            "Camera updates after {steps} {unit}; {over}; {rounds} in each."
+            "Camera updates, bases after {steps:e} steps; {over}; {rounds} in each."
         )),
         Block::heading(format!(
             "Camera bases turned by yaw {yaw}, pitch {pitch} and roll {roll} degrees per step"
         )),
-    ];
-    if all {
-        blocks.extend(rotations(report));
-    }
-    blocks.push(Block::Table(rated(report, all)));
-    blocks.extend(arm_blocks(&report.arm, all));
-    blocks
-}
-
-/// Title of a table of errors, and its cell.
-type Errors = (&'static str, fn(&RotationDrift) -> f64);
-
-/// Errors of bases: a row per method, a column per number of steps.
-fn rotations(report: &DriftReport) -> Vec<Block> {
-    let note = format!(
-        "Each figure is the largest of the {} steps that end there, a period between two \
-         corrections. The orbit has radius {ORBIT_RADIUS}; the eye hangs on the base.",
-        report.period_steps
-    );
-    let figures: [Errors; 4] = [
-        ("orthogonality after", |d| d.orthogonality_error),
-        ("angular error in rad after", |d| d.angle_error_rad),
-        ("orbit position error after", |d| d.orbit_position_error),
-        ("orbit radius error after", |d| d.orbit_radius_error),
-    ];
-    let grid = |(title, error): Errors| {
-        let drifts = report.rotation.iter();
-        let cell = |d: &RotationDrift| [d.method.into(), steps(d.steps), scientific(error(d))];
-        Block::Table(Table::grid(title, drifts.map(cell)))
-    };
-    let by_turns = report.one_degree_turns.iter().map(|d| {
-        let turns = text::counted(d.turns as usize, "turn");
-        [d.method.into(), turns, format!("{:.3e}", d.angle_error_rad)]
-    });
-    let by_turns = Table::grid("by 1 degree per step: error in rad after", by_turns);
-    let mut blocks = vec![Block::Line(note)];
-    blocks.extend(figures.map(grid));
-    blocks.push(Block::Table(by_turns));
-    blocks
-}
-
-/// Methods with error and time; with `all` a line about each.
-fn rated(report: &DriftReport, all: bool) -> Table {
-    let columns: [Column<&Rated>; 5] = [
-        ("method", |r| {
-            let default = if r.is_default { " (default)" } else { "" };
-            format!("{}{default}", r.name)
-        }),
-        (">error", |r| scientific(r.error)),
-        (">time per step", |r| time_plus_minus(r.time_per_step)),
-        ("", |r| if r.qualifies { "yes" } else { "no" }.to_owned()),
-        ("description", |r| r.summary.to_owned()),
-    ];
-    let shown = if all { columns.len() } else { 4 };
-    let mut table = Table::with(&report.rotation_methods, &columns[..shown]);
-    table.header[3] = format!("within {:e}", report.tolerance_rad);
-    table
-}
-
-fn chosen(choice: &Recommendation) -> &str {
-    choice.name.as_deref().unwrap_or("nothing")
-}
-
-/// The recommended way to turn, with its figures.
-fn recommended(report: &DriftReport) -> String {
-    let choice = &report.recommended_rotation;
-    let name = chosen(choice);
-    let mut methods = report.rotation_methods.iter();
-    let figures = some(methods.find(|row| row.name == name), |row| {
-        let time = time_plus_minus(row.time_per_step);
-        format!(" ({time} per step, error {})", scientific(row.error))
-    });
-    let reason = &choice.reason;
-    format!("Recommended for a camera base: {name}{figures}, {reason}.")
-}
-
-/// Method of each arm; with `all` errors, orders and limits of stability as well.
-fn arm_blocks(report: &ArmReport, all: bool) -> Vec<Block> {
-    let mut blocks = vec![
-        Block::heading("Spring arms, critically damped, behind a moving target"),
+        Block::Table(bases(report, all)),
+        Block::heading(format!(
+            "Spring arms, critically damped, behind a moving target, {RATE_HZ} Hz"
+        )),
         Block::line(format!(
-            "The target is known where frames end. Errors are the largest at the end of a frame in \
-             {} s, times are thread CPU time per simulated second.",
-            report.seconds
+            "The target is known where frames end. xN: N steps per frame, then the largest error at \
+             the end of a frame in {SECONDS} s and the thread CPU time per simulated second; no: \
+             even the least error is larger."
         )),
     ];
-    for (arm, name, what) in ARMS {
-        if all && report.points.iter().any(|p| p.setting.arm == arm) {
-            blocks.push(Block::Heading(3, format!("{name} arm: {what}")));
-            let title = format!("{name}, within {:e}", report.tolerance);
-            let cell = |own: &[&ArmPoint]| within(own, report.tolerance);
-            blocks.push(Block::Table(by_stiffness(report, arm, &title, cell)));
-            let title = format!("{name}, observed order");
-            blocks.push(Block::Table(by_stiffness(report, arm, &title, orders)));
-        }
-    }
+    blocks.push(Block::Table(by_stiffness(report)));
     if all {
-        blocks.push(Block::line(
-            "xN: N steps per frame, then the error and the time; no: even the least error is larger. \
-             Orders are the powers of the step by which a method's own error falls from each \
-             number of steps to the next. They are not the classical ones where steps are not far \
-             below 1/omega, and where the arm meets the stop.",
-        ));
-        blocks.push(Block::Table(stability(&report.stability)));
+        blocks.push(Block::Table(methods(report)));
     }
-    blocks.push(Block::Table(choices(report, all)));
     blocks
+}
+
+/// Ways to turn with errors and time; with `all` a line about each.
+fn bases(report: &DriftReport, all: bool) -> Table {
+    let columns: [Column<&Rotation>; 5] = [
+        ("method", |r| r.method.name.to_owned()),
+        (">orthogonality", |r| scientific(r.orthogonality_error)),
+        (">angle, rad", |r| scientific(r.angle_error_rad)),
+        (">time per step", |r| time_plus_minus(r.time_per_step)),
+        ("description", |r| r.method.summary.to_owned()),
+    ];
+    let shown = if all { columns.len() } else { 4 };
+    Table::with(&report.rotation, &columns[..shown])
 }
 
 /// The way to turn, and the method to take for each stiffness of each arm.
 fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
-    let choices = report.arm.choices.iter();
-    let arms = grouped(choices.map(|c| (c.setting.arm.name(), c))).into_iter();
-    let of_arms = arms.map(|(arm, own)| {
-        let each = own.iter();
-        let each = each.map(|c| format!("{} at k={:e}", chosen(&c.choice), c.setting.stiffness));
-        let (each, within) = (text::joined(each), report.arm.tolerance);
-        let what = match own.iter().any(|c| c.choice.name.is_some()) {
-            true => "the cheapest with",
-            false => "no method has",
-        };
-        format!("Recommended for a {arm} arm: {each}, {what} an error within {within:e}.")
+    let base = ("camera base".to_owned(), &report.recommended_rotation);
+    let arms = report.arm_choices.iter().map(|choice| {
+        let (arm, k) = (choice.setting.arm.name(), choice.setting.stiffness);
+        (format!("{arm} arm, k={k:e}"), &choice.choice)
     });
-    let told = [recommended(report)].into_iter().chain(of_arms);
-    told.map(Block::Line)
+    [base].into_iter().chain(arms).map(|(what, choice)| {
+        let name = choice.name.as_deref().unwrap_or("nothing");
+        Block::Line(format!(
+            "Recommended for a {what}: {name}, {}.",
+            choice.reason
+        ))
+    })
 }
 
-/// A table of an arm: a row per method, a column per stiffness.
-fn by_stiffness(
-    report: &ArmReport,
-    arm: ArmKind,
-    title: &str,
-    cell: impl Fn(&[&ArmPoint]) -> String,
-) -> Table {
-    let points = report.points.iter().filter(|p| p.setting.arm == arm);
-    let points: Vec<&ArmPoint> = points.collect();
-    let is_same = |a: &&ArmPoint, b: &&ArmPoint| (a.setting, a.method) == (b.setting, b.method);
-    let cells = points.chunk_by(is_same).map(|own| {
-        let stiffness = format!("k={:e}", own[0].setting.stiffness);
-        [own[0].method.to_owned(), stiffness, cell(own)]
+/// A row per method, a column per arm and stiffness.
+fn by_stiffness(report: &DriftReport) -> Table {
+    let is_same = |a: &ArmPoint, b: &ArmPoint| (a.setting, a.method) == (b.setting, b.method);
+    let cells = report.arm_points.chunk_by(is_same).map(|own| {
+        let (arm, k) = (own[0].setting.arm.name(), own[0].setting.stiffness);
+        [
+            own[0].method.to_owned(),
+            format!("{arm}, k={k:e}"),
+            within(own),
+        ]
     });
-    Table::grid(title, cells)
+    Table::grid(&format!("within {ARM_TOLERANCE:e}"), cells)
 }
 
-/// "x4: 1.2e-4, 3.21 us" of the cheapest that is precise enough, or the nearest.
-fn within(points: &[&ArmPoint], tolerance: f64) -> String {
-    let error = |point: &&&ArmPoint| point.position_error;
-    let time = |point: &ArmPoint| point.us_per_second.map_or(f64::INFINITY, |us| us.value);
-    let good = points.iter().filter(|p| error(p) <= tolerance);
-    let best = good.min_by(|a, b| time(a).total_cmp(&time(b)));
+/// "x4: 1.2e-4, 3.21 us" of the fewest steps that are precise enough, or the nearest.
+fn within(points: &[ArmPoint]) -> String {
+    let error = |point: &&ArmPoint| point.position_error;
+    let good = points.iter().find(|p| error(p) <= ARM_TOLERANCE);
     let sound = points.iter().filter(|p| !error(p).is_nan());
-    match (best, sound.min_by(|a, b| error(a).total_cmp(&error(b)))) {
+    match (good, sound.min_by(|a, b| error(a).total_cmp(&error(b)))) {
         (Some(p), _) => {
             let time = some(p.us_per_second, |us| text::time(us.value * 1e3));
             format!("x{}: {:.1e}, {time}", p.substeps, p.position_error)
@@ -264,79 +150,48 @@ fn within(points: &[&ArmPoint], tolerance: f64) -> String {
     }
 }
 
-/// "1.98 2.00".
-fn orders(points: &[&ArmPoint]) -> String {
-    let orders = points.iter().filter_map(|p| p.observed_order);
-    let orders: Vec<String> = orders.map(|order| format!("{order:.1}")).collect();
-    orders.join(" ")
-}
-
-fn stability(limits: &[StabilityLimit]) -> Table {
-    let cells = limits.iter().map(|limit| {
-        let shown = limit.limit_omega_h.map(|limit| format!("{limit:.4}"));
-        let shown = shown.unwrap_or("always".to_owned());
-        let damping = format!("zeta={}", limit.damping_ratio);
-        [limit.method.to_owned(), damping, shown]
-    });
-    Table::grid("stable while omega h <", cells)
-}
-
-/// The method of each arm; with `all` the reasons too.
-fn choices(report: &ArmReport, all: bool) -> Table {
-    let columns: [Column<&ArmChoice>; 5] = [
-        ("", |c| {
-            let setting = &c.setting;
-            let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
-            format!("{arm} k={k:e}, {rate} Hz")
+/// What the methods of arms do, their classical orders and limits of stability.
+fn methods(report: &DriftReport) -> Table {
+    let columns: [Column<&Stability>; 4] = [
+        ("method", |m| m.method.name.to_owned()),
+        (">classical order", |m| m.method.order.to_string()),
+        (">stable while omega h <", |m| match m.limit_omega_h {
+            Some(limit) => format!("{limit:.4}"),
+            None => "always".to_owned(),
         }),
-        ("method", |c| chosen(&c.choice).to_owned()),
-        (">error", |c| some(c.position_error, scientific)),
-        (">time per s", |c| {
-            some(c.us_per_second, |us| text::time(us * 1e3))
-        }),
-        ("why", |c| c.choice.reason.clone()),
+        ("description", |m| m.method.summary.to_owned()),
     ];
-    let shown = if all { columns.len() } else { 4 };
-    let mut table = Table::with(&report.choices, &columns[..shown]);
-    table.header[0] = format!("to take within {:e}", report.tolerance);
-    table
+    Table::with(&report.arm_methods, &columns)
 }
 
-/// Time and error, if the point has both.
-fn at(point: &ArmPoint) -> Option<[f64; 2]> {
-    let at = [point.us_per_second?.value * 1e3, point.position_error];
-    at.iter().all(|value| is_drawn(*value)).then_some(at)
+/// Time and error of a point, if it has both.
+fn place(point: &ArmPoint) -> Option<Point> {
+    let time = point.us_per_second?.per(1e-3);
+    let at = [time.value, point.position_error];
+    at.iter().all(|value| is_drawn(*value)).then(|| Point {
+        at,
+        wide: ends(time),
+        note: format!("{}, {} steps per frame", point.method, point.substeps),
+        ..Point::default()
+    })
 }
 
-fn arm_figures(report: &ArmReport) -> Vec<Figure> {
-    let places = || report.points.iter().filter_map(at);
-    let settings = report.points.chunk_by(|a, b| a.setting == b.setting);
+/// Error against time, a figure per arm and stiffness.
+fn arm_figures(report: &DriftReport) -> Vec<Figure> {
+    let places = || report.arm_points.iter().filter_map(place).map(|p| p.at);
+    let settings = (report.arm_points).chunk_by(|a, b| a.setting == b.setting);
     let figure = |points: &[ArmPoint]| {
-        let setting = points[0].setting;
-        let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
         let methods = points.chunk_by(|a, b| a.method == b.method);
-        let series = methods.map(|own| {
-            let nth = report.methods.iter().position(|m| m.name == own[0].method);
-            let point = |point: &ArmPoint| {
-                let wide = point.us_per_second.and_then(|us| us.lower.zip(us.upper));
-                let wide = wide.map(|(low, high)| [low * 1e3, high * 1e3]);
-                Some(Point {
-                    at: at(point)?,
-                    wide,
-                    note: format!("{}, {} steps per frame", point.method, point.substeps),
-                    ..Point::default()
-                })
-            };
-            Series {
-                name: own[0].method.to_owned(),
-                look: Look::nth(nth.unwrap_or(0)),
-                is_scan: false,
-                points: own.iter().filter_map(point).collect(),
-            }
+        let series = methods.enumerate().map(|(n, own)| Series {
+            name: own[0].method.to_owned(),
+            look: Look::nth(n),
+            is_scan: false,
+            points: own.iter().filter_map(place).collect(),
         });
+        let (arm, k) = (points[0].setting.arm.name(), points[0].setting.stiffness);
+        let caption = format!("{arm} arm, k = {k:e}/s2, {RATE_HZ} Hz: position error against time");
         let error = |error: f64| format!("{error:.0e}");
         let title = "CPU time per simulated second";
-        let caption = format!("{arm} arm, k = {k:e}/s2, {rate} Hz: position error against time");
         let axes = [
             Axis::log(title, places().map(|p| p[0]), 1.2, &text::time),
             Axis::log("", places().map(|p| p[1]), 2.0, &error),
@@ -345,10 +200,4 @@ fn arm_figures(report: &ArmReport) -> Vec<Figure> {
         Diagram::of(caption, axes, Joined::Marked, series).draw()
     };
     settings.map(figure).collect()
-}
-
-/// All as one picture: a row per arm, a column per stiffness.
-fn draw(report: &ArmReport) -> String {
-    let mut arms = (report.choices).chunk_by(|a, b| a.setting.arm == b.setting.arm);
-    picture(&arm_figures(report), arms.next().map_or(1, <[_]>::len))
 }

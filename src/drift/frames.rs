@@ -4,6 +4,7 @@
 
 use std::f64::consts::PI;
 use std::hint::black_box;
+use std::ops::RangeInclusive;
 
 use glam::{DMat3, DVec3, Quat, Vec3};
 use single::{DEGREE, LEVEL, sin_cos, turned, wide};
@@ -19,26 +20,22 @@ pub type Turn = [f64; 3];
 /// Slow and about no axis in particular.
 pub const STEADY: Turn = [0.7, 0.3, 0.1];
 
-/// A 360th of a turn to the left.
-pub const ONE_DEGREE: Turn = [1.0, 0.0, 0.0];
-
-/// Takes equal steps: the axes after each of the ascending numbers of them.
-pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;
+/// Takes equal steps: the axes after each of these numbers of them.
+pub type Walk = fn(RangeInclusive<u64>) -> Vec<DMat3>;
 
 /// A [`Walk`] by what a step does to the walker and where that is then.
-pub fn walk<W, S, P>(
+pub fn walk<W>(
     mut walker: W,
-    by: &S,
-    looks: &[u64],
-    step: impl Fn(&mut W, &S),
-    place: impl Fn(&W) -> P,
-) -> Vec<P> {
+    looks: RangeInclusive<u64>,
+    step: impl Fn(&mut W, &Turn),
+    place: impl Fn(&W) -> DMat3,
+) -> Vec<DMat3> {
     let mut taken = 0;
-    let mut places = Vec::with_capacity(looks.len());
-    for &look in looks {
+    let mut places = Vec::new();
+    for look in looks {
         for _ in taken..look {
             // Hidden, so that nothing is computed once for all steps.
-            step(&mut walker, black_box(by));
+            step(&mut walker, black_box(&STEADY));
         }
         taken = look;
         places.push(place(&walker));
@@ -59,7 +56,7 @@ pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
 
 /// The task of [`QUERY_STEPS`] equal steps.
 pub fn walking(walk: Walk) -> TimedTask<'static> {
-    task(move || drop(walk(&STEADY, &[QUERY_STEPS])))
+    task(move || drop(walk(QUERY_STEPS..=QUERY_STEPS)))
 }
 
 /// Corrections of the axes of a frame.
@@ -107,7 +104,7 @@ macro_rules! precision {
 
             /// Axes that are turned in place. Every step gets its angles as if from a
             /// mouse, and takes their sines and cosines.
-            pub fn frame<const CORRECTION: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+            pub fn frame<const CORRECTION: u8>(looks: RangeInclusive<u64>) -> Vec<DMat3> {
                 let step = |(axes, rotations): &mut ([$vector; 3], u32), turn: &Turn| {
                     *axes = turned(*axes, turn.map(|angle| angle as $real * DEGREE));
                     if CORRECTION == GRAM_SCHMIDT {
@@ -127,7 +124,7 @@ macro_rules! precision {
                         }
                     }
                 };
-                walk((LEVEL, 0), turn, looks, step, |(axes, _)| wide(*axes))
+                walk((LEVEL, 0), looks, step, |(axes, _)| wide(*axes))
             }
         }
     };
@@ -137,7 +134,7 @@ precision!(single, f32, Vec3, Mat3, libm::sinf, libm::cosf);
 precision!(double, f64, DVec3, DMat3, libm::sin, libm::cos);
 
 /// An f32 quaternion that is multiplied by the step's.
-pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+pub fn quaternion(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |q: &mut Quat, turn: &Turn| {
         let half = turn.map(|angle| sin_cos(angle as f32 * DEGREE * 0.5));
         let yaw = Quat::from_xyzw(0.0, half[0].0, 0.0, half[0].1);
@@ -146,22 +143,22 @@ pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
         *q = (*q * (yaw * pitch * roll)).normalize();
     };
     let axes = |q: &Quat| wide(LEVEL.map(|axis| *q * axis));
-    walk(Quat::IDENTITY, turn, looks, step, axes)
+    walk(Quat::IDENTITY, looks, step, axes)
 }
 
 /// Sums of f32 angles in radians, and the axes that follow from them.
-pub fn radians(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+pub fn radians(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |(sums, axes): &mut ([f32; 3], [Vec3; 3]), turn: &Turn| {
         *sums = [0, 1, 2].map(|k| sums[k] + turn[k] as f32 * DEGREE);
         *axes = turned(LEVEL, *sums);
     };
     let axes = |(_, axes): &([f32; 3], [Vec3; 3])| wide(*axes);
-    walk(([0.0; 3], LEVEL), turn, looks, step, axes)
+    walk(([0.0; 3], LEVEL), looks, step, axes)
 }
 
 /// Basis of this toolkit's camera, with angles that are stretched.
 #[inline(always)]
-pub fn toolkit(turn: &Turn, looks: &[u64], stretch: f64) -> Vec<DMat3> {
+pub fn toolkit(looks: RangeInclusive<u64>, stretch: f64) -> Vec<DMat3> {
     let level = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
     let level = level.expect("two points and an up vector make a frame");
     let step = |frame: &mut camera::Frame, turn: &Turn| {
@@ -170,7 +167,7 @@ pub fn toolkit(turn: &Turn, looks: &[u64], stretch: f64) -> Vec<DMat3> {
         frame.roll(turn[2] * stretch);
     };
     let axes = |frame: &camera::Frame| DMat3::from_cols(frame.u(), frame.v(), frame.n());
-    walk(level, turn, looks, step, axes)
+    walk(level, looks, step, axes)
 }
 
 /// The lecture's programs take pi for this.
@@ -183,8 +180,9 @@ mod tests {
 
     #[test]
     fn looks_are_taken_after_exactly_so_many_steps() {
-        let step = |at: &mut f64, by: &f64| *at += by;
-        let places = walk(5.0, &3.0, &[0, 1, 10, 10, 12], step, |at| *at);
-        assert_eq!(places, [5.0, 8.0, 35.0, 35.0, 41.0]);
+        let step = |at: &mut f64, _: &Turn| *at += 3.0;
+        let place = |at: &f64| DMat3::from_diagonal(DVec3::splat(*at));
+        let places = walk(5.0, 10..=12, step, place);
+        assert_eq!(places, [35.0, 38.0, 41.0].map(|at| place(&at)));
     }
 }

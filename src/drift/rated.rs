@@ -11,17 +11,12 @@ pub struct Recommendation {
     pub name: Option<String>,
     /// Others that are good enough and that the processes do not show to be slower.
     pub as_fast: Vec<String>,
-    /// Share of the largest allowed error that its own leaves free.
-    pub margin: Option<f64>,
     /// The choice in a sentence.
     pub reason: String,
 }
 
 /// A method: its name, error (NaN if it is lost), ln of its time in every process.
 pub type Candidate = (String, f64, Vec<f64>);
-
-/// Smaller margins, as a share of the limit, are said.
-const SMALL_MARGIN: f64 = 0.05;
 
 /// Recommends the most precise of the fastest candidates within the tolerance, by a
 /// paired test over the processes.
@@ -32,24 +27,15 @@ pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Reco
     let mut fastest: Vec<_> = ranked.filter(|c| c.1 == 1).map(|c| *c.0).collect();
     fastest.sort_by(|a, b| a.1.total_cmp(&b.1));
     let as_fast: Vec<String> = fastest.iter().skip(1).map(|c| c.0.clone()).collect();
-    let sound = candidates.iter().filter(|c| !c.1.is_nan());
-    let nearest = sound.min_by(|a, b| a.1.total_cmp(&b.1));
     let (count, others) = (good.len(), as_fast.join(", "));
-    let mut reason = match (fastest.len(), nearest) {
-        (0, None) => format!("no method has {rule}"),
-        (0, Some((name, error, _))) => format!("no method has {rule}: {name} has {error:.1e}"),
-        (1, _) => format!("the cheapest of {count} with {rule}"),
+    let reason = match fastest.len() {
+        0 => format!("no method has {rule}"),
+        1 => format!("the cheapest of {count} with {rule}"),
         _ => format!("the most precise of the cheapest (as fast: {others}) of {count} with {rule}"),
     };
-    let margin = fastest.first().map(|c| 1.0 - c.1 / tolerance);
-    if let Some(margin) = margin.filter(|margin| *margin < SMALL_MARGIN) {
-        let percent = 100.0 * margin;
-        reason += &format!("; its error is only {percent:.2} % below the limit");
-    }
     Recommendation {
         name: fastest.first().map(|c| c.0.clone()),
         as_fast,
-        margin,
         reason,
     }
 }
@@ -85,23 +71,10 @@ mod tests {
             assert_eq!(rough.reason, "the cheapest of 3 with such errors");
             assert_eq!(choose(1e-6).name.as_deref(), Some("precise"));
             let none = choose(1e-15);
-            assert_eq!((none.name, none.margin), (None, None));
-            assert_eq!(
-                none.reason,
-                "no method has such errors: precise has 1.0e-12"
-            );
+            assert_eq!(none.name, None);
+            assert_eq!(none.reason, "no method has such errors");
         }
         assert_eq!(recommended(&[], 1.0, "any").reason, "no method has any");
-    }
-
-    #[test]
-    fn a_small_margin_is_said() {
-        let near = recommended(&three(1, 0.0), 1e-3, "such errors");
-        assert!((near.margin.unwrap_or(0.0) - 0.04).abs() < 1e-12);
-        let said = "; its error is only 4.00 % below the limit";
-        assert!(near.reason.ends_with(said), "{}", near.reason);
-        let far = recommended(&three(1, 0.0), 1e-2, "such errors");
-        assert!(!far.reason.contains("below"), "{}", far.reason);
     }
 
     #[test]

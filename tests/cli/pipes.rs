@@ -106,7 +106,7 @@ fn a_full_disk_is_one_error_line() {
         "locate --scene scene.csv --points points.csv --format json",
         "query --scene scene.csv --cameras cameras.csv --format json",
         "verify --cases 5",
-        "drift --steps 1000 --processes 1 --seconds 1 --arm linear --rate 60 --stiffness 1e2",
+        "drift --steps 1000 --processes 1",
         "scene generate uniform:n=20000",
         "scene info scene.csv",
         "run --scene scene.csv --path orbit:frames=2 --out run",
