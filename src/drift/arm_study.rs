@@ -229,7 +229,7 @@ mod tests {
     /// Differential Equations II", IV.2), semi-implicit Euler by Jury's conditions.
     #[test]
     fn limits_found_are_the_limits_of_the_formulas() {
-        for zeta in [0.1, 0.5, 1.0, 2.0] {
+        for zeta in [0.1f64, 0.5, 1.0, 2.0] {
             let fast = zeta + (zeta * zeta - 1.0).max(0.0).sqrt();
             let explicit = if zeta <= 1.0 { 2.0 * zeta } else { 2.0 / fast };
             let found = |name| limit(method(name), zeta);

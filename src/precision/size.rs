@@ -1,5 +1,6 @@
-//! Cubes strewn about a frustum: what the sweep over size tests. The unit of length is
-//! the depth.
+//! Cubes strewn about a frustum: what the sweep over size tests.
+//!
+//! The unit of length is the depth.
 
 use glam::{DVec3, Vec3};
 

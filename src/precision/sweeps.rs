@@ -1,4 +1,4 @@
-//! Error against the size of items, and against what makes a camera ill-conditioned.
+//! Error against the size of items and against ill-conditioned cameras.
 //!
 //! By size every test, on cubes strewn about frusta. By how far from zero the world lies,
 //! how small it is, far/near, field of view, aspect, and how nearly up is the direction of
