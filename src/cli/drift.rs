@@ -45,14 +45,6 @@ pub fn time(args: &DriftArgs, timing: &Timing) -> anyhow::Result<ProcessTimes> {
     Ok(drift::time(&timing.plan()?, &protocol))
 }
 
-/// Two digits of something that spans many powers of ten.
-fn scientific(value: f64) -> String {
-    match value.is_nan() {
-        true => "lost".to_owned(),
-        false => format!("{value:.1e}"),
-    }
-}
-
 /// Tables and recommendations.
 fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     let mut blocks = tables(report, all);
@@ -77,7 +69,7 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
         )),
         Block::Table(bases(report, all)),
         Block::heading(format!(
-            "Spring arms, critically damped, behind a moving target, {RATE_HZ} Hz"
+            "Spring arms, critically damped, {RATE_HZ} frames a second"
         )),
         Block::line(format!(
             "The target is known where frames end. xN: N steps per frame, then the largest error at \
@@ -96,8 +88,10 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
 fn bases(report: &DriftReport, all: bool) -> Table {
     let columns: [Column<&Rotation>; 5] = [
         ("method", |r| r.method.name.to_owned()),
-        (">orthogonality", |r| scientific(r.orthogonality_error)),
-        (">angle, rad", |r| scientific(r.angle_error_rad)),
+        (">orthogonality", |r| {
+            format!("{:.1e}", r.orthogonality_error)
+        }),
+        (">angle, rad", |r| format!("{:.1e}", r.angle_error_rad)),
         (">time per step", |r| time_plus_minus(r.time_per_step)),
         ("description", |r| r.method.summary.to_owned()),
     ];
@@ -137,17 +131,15 @@ fn by_stiffness(report: &DriftReport) -> Table {
 
 /// "x4: 1.2e-4, 3.21 us" of the fewest steps that are precise enough, or the nearest.
 fn within(points: &[ArmPoint]) -> String {
-    let error = |point: &&ArmPoint| point.position_error;
-    let good = points.iter().find(|p| error(p) <= ARM_TOLERANCE);
-    let sound = points.iter().filter(|p| !error(p).is_nan());
-    match (good, sound.min_by(|a, b| error(a).total_cmp(&error(b)))) {
-        (Some(p), _) => {
-            let time = some(p.us_per_second, |us| text::time(us.value * 1e3));
-            format!("x{}: {:.1e}, {time}", p.substeps, p.position_error)
-        }
-        (None, Some(p)) => format!("no: x{} {:.1e}", p.substeps, p.position_error),
-        (None, None) => "unstable".to_owned(),
-    }
+    let is_good = |p: &&ArmPoint| p.position_error <= ARM_TOLERANCE;
+    let sound = points.iter().filter(|p| !p.position_error.is_nan());
+    let nearest = sound.min_by(|a, b| a.position_error.total_cmp(&b.position_error));
+    let Some(p) = points.iter().find(is_good).or(nearest) else {
+        return "unstable".to_owned();
+    };
+    let no = if is_good(&p) { "" } else { "no: " };
+    let time = some(p.us_per_second, |us| text::time(us.value * 1e3));
+    format!("{no}x{}: {:.1e}, {time}", p.substeps, p.position_error)
 }
 
 /// What the methods of arms do, their classical orders and limits of stability.

@@ -179,7 +179,11 @@ impl Setting {
 pub fn conclude(points: &mut [ArmPoint], times: &OverProcesses, first: usize) -> ArmChoice {
     let mut candidates = Vec::new();
     for (task, point) in (first..).zip(&mut *points) {
-        candidates.push((point.label(), point.position_error, times.ln_ns(task)));
+        let label = match point.substeps {
+            1 => point.method.to_owned(),
+            substeps => format!("{} x{substeps}", point.method),
+        };
+        candidates.push((label, point.position_error, times.ln_ns(task)));
         if !point.position_error.is_nan() {
             point.us_per_second = times.ns(task).map(|ns| ns.per(1e3));
         }
@@ -188,16 +192,6 @@ pub fn conclude(points: &mut [ArmPoint], times: &OverProcesses, first: usize) ->
     ArmChoice {
         setting: points[0].setting,
         choice: recommended(&candidates, ARM_TOLERANCE, &rule),
-    }
-}
-
-impl ArmPoint {
-    /// Name with the number of steps: "rk4 x4".
-    pub fn label(&self) -> String {
-        match self.substeps {
-            1 => self.method.to_owned(),
-            substeps => format!("{} x{substeps}", self.method),
-        }
     }
 }
 
