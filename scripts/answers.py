@@ -34,7 +34,7 @@ FUNNELS = [
     ["--scene", "freedm-map12", "--path", "places:frames=3"],
 ]
 # Fields of time, or of what follows from times.
-TIMED = {"dominated_by", "is_tie", "on_front", "twin", "as_fast", "reason", "ratio", "seconds", "qualifies",
+TIMED = {"dominated_by", "is_tie", "on_front", "twin", "as_fast", "reason", "ratio", "seconds",
          "conclusion", "conclusions", "memory_bytes_per_item", "summary", "expected"}
 TIMED_ENDS = ("_ns", "_ns_lower", "_ns_upper", "ratio_lower", "ratio_upper", "us_per_second",
               "us_per_second_lower", "us_per_second_upper", "ns_per_step", "ns_per_step_lower",
