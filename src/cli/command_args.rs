@@ -93,8 +93,8 @@ pub struct FunnelArgs {
     /// [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
-    /// Compare every back end of every stage, depth orders, picking and lower bounds
-    /// too, as --format json, --csv and --html do
+    /// Compare every back end of every stage, depth orders and picking too, as --format
+    /// json, --csv and --html do
     #[arg(long)]
     pub all: bool,
     /// Leave picking out of what --all, --format, --csv and --html add

@@ -4,7 +4,7 @@
 use super::document::Block;
 use super::table::{Column, Table};
 use super::text::{self, some};
-use crate::funnel::{BoundRow, FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
+use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
 use crate::shown::shortened;
 use crate::visibility::{Guarantee, Level};
 
@@ -65,10 +65,6 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         ),
         ("Draw orders of the remaining items", orders(report)),
         ("Picking: items under a cursor", picks(report)),
-        (
-            "Lower bounds: the least that must be read or written",
-            bounds(report),
-        ),
         ("With and without each stage of the chain", gains(report)),
     ] {
         if all && !table.rows.is_empty() {
@@ -95,7 +91,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     };
     let told = report.conclusions.iter().filter(is_shown).cloned();
     blocks.extend(told.map(Block::Line));
-    let more = "every other back end, draw orders, picking, lower bounds: --all";
+    let more = "every other back end, draw orders, picking: --all";
     blocks.extend(Block::more(all, more));
     blocks
 }
@@ -259,18 +255,6 @@ fn picks(report: &FunnelReport) -> Table {
         (">time per cursor", |row| some(row.ns_per_ray, text::time)),
     ];
     Table::with(&report.picks, columns)
-}
-
-fn bounds(report: &FunnelReport) -> Table {
-    let columns: &[Column<&BoundRow>] = &[
-        ("bound", |row| row.name.to_owned()),
-        ("of", |row| row.back_end.to_owned()),
-        (">time", |row| text::time_plus_minus(row.time)),
-        (">ratio", |row| {
-            some(row.ratio, |ratio| text::significant(ratio.value))
-        }),
-    ];
-    Table::with(&report.bounds, columns)
 }
 
 fn gains(report: &FunnelReport) -> Table {

@@ -6,7 +6,6 @@
 //! that differs from it in one stage: [`prepare`] counts, [`time`] measures in each
 //! process, [`Prepared::conclude`] combines both.
 
-mod bounds;
 mod error;
 mod fragment_stage;
 mod item_stages;
@@ -20,7 +19,6 @@ mod triangle_stage;
 mod truth;
 mod world;
 
-pub use bounds::BoundRow;
 pub(crate) use error::check_memory;
 pub use item_stages::Fate;
 pub use orders::OrderRow;

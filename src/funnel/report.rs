@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::bounds::BoundRow;
 use super::error::LeftOutRow;
 use super::fragment_stage::FragmentCounts;
 use super::item_stages::PlanView;
@@ -57,8 +56,6 @@ pub struct FunnelReport {
     pub picks: Vec<PickRow>,
     /// Missing rows, each with its reason.
     pub left_out: Vec<LeftOutRow>,
-    /// Lower bounds of some of the back ends.
-    pub bounds: Vec<BoundRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,
     /// Conclusions, a sentence each.

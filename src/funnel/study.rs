@@ -4,14 +4,13 @@
 
 use anyhow::Result;
 
-use super::bounds::{bounds, covered_key};
 use super::error::{LeftOutRow, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage};
 use super::item_stages::{ItemStages, PlanView};
 use super::orders::{OrderRow, Orders, SORTED};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
-use super::stage::{Chain, NONE, StageKind, Z, default_test, left_out_of};
+use super::stage::{Chain, NONE, StageKind, default_test, left_out_of};
 use super::task::{FunnelKey, FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
@@ -72,7 +71,7 @@ impl<'w> Study<'w> {
         })
     }
 
-    /// Every task but the bounds.
+    /// Everything that is timed.
     fn tasks(&self) -> Vec<KeyedTask<'_>> {
         let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
         tasks.extend(self.triangles.tasks());
@@ -183,11 +182,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     begin("every stage, compared with the truth");
     let study = Study::new(&world, input)?;
     let mut rows = study.rows(&truth);
-    let mut covered: Vec<u64> = Vec::new();
     for (back_end, errors, tallies) in study.fragments.tested(&study.items, &truth) {
-        if back_end.name == Z {
-            covered = tallies.iter().map(|tally| tally.covered_count).collect();
-        }
         rows.push(StageRow {
             fragments: FragmentCounts::of(&tallies),
             ..StageRow::new(back_end, back_end.name, &input.chain, errors)
@@ -216,9 +211,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         let reason = "not asked for: --no-picks";
         left_out.push(LeftOutRow::new(["picks", "all"], reason));
     }
-    let bounds = || bounds(&world, &study.triangles, &covered);
-    let bounds = input.all.then(bounds);
-    let (bounds, bound_tasks): (Vec<_>, Vec<_>) = bounds.into_iter().flatten().unzip();
     let mut gains = study.gains(&rows);
     gains.extend(study.gain_of_sorting(&orders).filter(|_| input.sorted));
     let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
@@ -246,13 +238,11 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         orders,
         picks,
         left_out,
-        bounds,
         conclusions: Vec::new(),
         warnings,
         plan_view: PlanView::of(&world, &study.items, &input.chain, &truth),
     };
     let mut tasks = study.tasks();
-    tasks.extend(bound_tasks);
     if !input.all {
         tasks.retain(|(key, _)| report.needs(key));
     }
@@ -269,12 +259,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
 pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes> {
     let world = World::new(input, &|_| ())?;
     let study = Study::new(&world, input)?;
-    let mut tasks = study.tasks();
-    if let Some(covered) = plan.expected(&covered_key()) {
-        let bounds = bounds(&world, &study.triangles, covered).into_iter();
-        tasks.extend(bounds.map(|(_, task)| task));
-    }
-    Ok(plan.time(tasks, input))
+    Ok(plan.time(study.tasks(), input))
 }
 
 impl Prepared {
@@ -285,9 +270,6 @@ impl Prepared {
         report.processes = processes.len();
         let chain = &report.chain;
         for row in &mut report.stages {
-            row.set(chain, &times);
-        }
-        for row in &mut report.bounds {
             row.set(chain, &times);
         }
         for row in &mut report.picks {

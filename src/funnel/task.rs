@@ -37,8 +37,6 @@ pub enum FunnelKey {
     Order(String),
     /// A back end of picking.
     Pick(PickQuestion, String),
-    /// A lower bound of a stage.
-    Bound(StageKind, String),
 }
 
 impl FunnelKey {
@@ -83,12 +81,6 @@ impl FunnelPlan {
         let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
         let ask = |key: &FunnelKey| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
         ProcessTimes::of(&self.timed(&input.setting.protocol, ask))
-    }
-
-    /// Expected numbers of ids of a task, by view.
-    pub fn expected(&self, key: &FunnelKey) -> Option<&[u64]> {
-        let found = self.tasks.iter().find(|(own, _)| own == key);
-        found.map(|(_, expected)| &expected[..])
     }
 
     /// Times of all processes.

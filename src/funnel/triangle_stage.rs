@@ -111,10 +111,6 @@ impl TriangleStage {
         }
     }
 
-    pub fn clusters(&self, view: usize) -> &Arc<Clusters> {
-        &self.views[view].built.clusters
-    }
-
     /// Triangles that a back end leaves; all of them by none.
     fn kept(&self, name: &str, view: usize) -> Selection {
         let faces = &self.views[view];
@@ -144,9 +140,10 @@ impl TriangleStage {
     /// Triangles of a view that a back end leaves, by their index among the surfaces.
     pub fn triangles(&self, name: &str, view: usize) -> Vec<u32> {
         let kept = self.kept(name, view);
+        let clusters = &self.views[view].built.clusters;
         let mut triangles = Vec::with_capacity(kept.triangles());
         for (cluster, word) in kept.words().iter().enumerate() {
-            let all = self.clusters(view).triangles_of(cluster).iter().enumerate();
+            let all = clusters.triangles_of(cluster).iter().enumerate();
             triangles.extend(all.filter(|(bit, _)| word >> bit & 1 == 1).map(|(_, t)| t));
         }
         triangles

@@ -182,7 +182,6 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         "stages",
         "orders",
         "picks",
-        "bounds",
         "gains",
     ];
     let mut headers = std::collections::BTreeMap::new();
@@ -311,7 +310,6 @@ fn the_chain_is_shown_and_the_rest_is_asked_for() {
         "?: FN at these samples only",
         "Draw orders",
         "Picking",
-        "Lower bounds",
     ];
     for name in rest {
         assert!(!chain.contains(&format!("{name} ")) && !chain.contains(&format!("{name}:")));
@@ -324,30 +322,6 @@ fn the_chain_is_shown_and_the_rest_is_asked_for() {
         all.contains("Left out (picks, all): not asked for: --no-picks."),
         "{all}"
     );
-}
-
-#[test]
-fn lower_bounds_are_of_the_back_ends_beside_them() {
-    let line = "funnel --scene rooms:n=500 --path street:frames=2 --samples 96x54 --processes 1 \
-                --format json";
-    let report = json(&works(Path::new("."), line));
-    let bounds = array(&report, "bounds");
-    let of: Vec<_> = bounds
-        .iter()
-        .map(|b| b["back_end"].as_str().expect("a name"))
-        .collect();
-    assert_eq!(of, ["portal-clip", "cone-f32-safe", "z-test"]);
-    for bound in bounds {
-        let (stage, name) = (&bound["stage"], &bound["back_end"]);
-        let mut rows = array(&report, "stages").iter();
-        let row = rows.find(|row| row["stage"] == *stage && row["name"] == *name);
-        let row = row.expect("the back end");
-        let own = number(bound, "stage_ns");
-        assert!(own > 0.0, "{bound}");
-        // The ratio of the shown times.
-        let (ratio, ns) = (number(bound, "ratio"), number(row, "stage_ns"));
-        assert!((ratio / (ns / own) - 1.0).abs() < 1e-9, "{bound}: {ns}");
-    }
 }
 
 /// Checks that picking back ends with a guarantee are right, for every question.

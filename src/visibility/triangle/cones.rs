@@ -170,13 +170,6 @@ impl<const N: usize> Cones<N> {
             triangles: words,
         }
     }
-
-    /// Reads all cones once: a lower bound of any test of them.
-    ///
-    /// The value only keeps the compiler from omitting the reads.
-    pub fn read(&self, kernel: Kernel) -> u64 {
-        kernel.run(Read(bytemuck::cast_slice(self.cones.as_flattened())))
-    }
 }
 
 impl<const N: usize> TriangleCull for Cones<N> {
@@ -206,23 +199,6 @@ impl<const N: usize> Work for Query<'_, N> {
                 }
             }
         }
-    }
-}
-
-struct Read<'a>(&'a [[u64; 8]]);
-
-impl Work for Read<'_> {
-    type Output = u64;
-
-    #[inline(always)]
-    fn run<I: Isa>(self, _: I) -> u64 {
-        let mut all = [0; 8];
-        for line in self.0 {
-            for (all, word) in all.iter_mut().zip(line) {
-                *all ^= word;
-            }
-        }
-        all.iter().fold(0, |all, word| all ^ word)
     }
 }
 
@@ -260,7 +236,7 @@ fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
 }
 
 /// Sixteen cones in f32: 28 bytes a cone.
-#[derive(Clone, Copy, Debug, bytemuck::Zeroable, bytemuck::Pod)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct ConeBlock {
     apex: [[f32; LANES]; 3],

@@ -198,13 +198,3 @@ fn the_proven_margin_costs_next_to_nothing() {
         assert!(removed("several-cones") >= 1.1 * unsafe_one, "{name}");
     }
 }
-
-#[test]
-fn cones_are_read_alike_by_every_kernel() {
-    for (_, clusters) in scenes() {
-        let safe = SafeCones::of(&clusters);
-        for kernel in Kernel::available() {
-            assert_eq!(safe.read(kernel), safe.read(Kernel::Portable));
-        }
-    }
-}
