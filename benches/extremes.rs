@@ -1,9 +1,9 @@
-//! Builds on scenes that break naive structures: the build time and depth-driven
-//! memory of each structure, and the build time of the picking back ends written here
-//! or over obvhs, on a million unpleasant items against the uniform scene of the same
-//! size, in one run. Exits 3 if a build takes more than three times as long.
-//! `-- --test` runs a thousand items and judges nothing. Other crates' structures are
-//! left out: obvhs by itself takes quadratic time for posts and nested boxes.
+//! Builds on scenes that break naive structures: the build time and depth-driven memory
+//! of each structure, and the build time of picking by `wide-ray`, on a million unpleasant
+//! items against the uniform scene of the same size, in one run. Exits 3 if a build takes
+//! more than three times as long. `-- --test` runs a thousand items and judges nothing.
+//! Other crates' structures are left out: obvhs by itself takes quadratic time for posts
+//! and nested boxes.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use cullbench::index::{Origin, Registry, Row, StructureSpec};
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene};
 use cullbench::visibility::Solids;
-use cullbench::visibility::pick::BACK_ENDS;
+use cullbench::visibility::pick::WideRay;
 use cullbench::visibility::truth::Boxes;
 use glam::Vec3;
 
@@ -75,9 +75,6 @@ const SHAPES: [Shape; 12] = [
     }),
 ];
 
-/// Back ends of picking whose trees are built or clustered here.
-const PICKING: [&str; 2] = ["wide-ray", "obvhs-cwbvh"];
-
 /// Median build time in seconds, and the bytes where they are known.
 type Build = Box<dyn Fn(&Scene) -> (f64, Option<usize>)>;
 
@@ -107,14 +104,11 @@ fn builds() -> Vec<(&'static str, Build)> {
         };
         all.push((row.info.name, Box::new(build)));
     }
-    for row in BACK_ENDS.iter().filter(|row| PICKING.contains(&row.name)) {
-        let build = |scene: &Scene| {
-            let boxes = Boxes::of(&Solids::of(scene));
-            let built = || (row.build.boxes)(&boxes, Kernel::best()).expect("can be built");
-            (median(built).0, None)
-        };
-        all.push((row.name, Box::new(build)));
-    }
+    let wide_ray = |scene: &Scene| {
+        let boxes = Boxes::of(&Solids::of(scene));
+        (median(|| WideRay::of(&boxes, Kernel::best())).0, None)
+    };
+    all.push(("wide-ray", Box::new(wide_ray)));
     all
 }
 

@@ -3,12 +3,11 @@
 //! `cullbench run`. Before them, that harness beside a loop written by hand, the floors
 //! of the stages of visibility, and region search beside itself in f32 alone. Exits 3 if
 //! a floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
-//! `hidden`, `stored-rows`, `truth`, `picking`, `region-search`, or rows with the
-//! word in their scene or structure. `-- --test` only checks that every row runs.
+//! `hidden`, `stored-rows`, `truth`, `region-search`, or rows with the word in their scene
+//! or structure. `-- --test` only checks that every row runs.
 
 mod hidden;
 mod occlusion;
-mod picking;
 mod region_search;
 mod stored_rows;
 mod truth;
@@ -240,13 +239,12 @@ fn main() -> ExitCode {
     };
     let turns = if only_test { 3 } else { TURNS };
     let mut missed = 0;
-    let parts: [(&str, Part); 7] = [
+    let parts: [(&str, Part); 6] = [
         ("harness", harness_overhead),
         ("occlusion", occlusion::missed),
         ("hidden", hidden::missed),
         ("stored-rows", stored_rows::missed),
         ("truth", truth::missed),
-        ("picking", picking::missed),
         ("region-search", region_search::missed),
     ];
     for (_, part) in parts.iter().filter(|(name, _)| chosen(name)) {

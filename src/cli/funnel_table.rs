@@ -249,7 +249,7 @@ fn orders(report: &FunnelReport) -> Table {
 fn picks(report: &FunnelReport) -> Table {
     let columns: &[Column<&PickRow>] = &[
         ("question", |row| row.question.name().to_owned()),
-        ("by", |row| format!("{}{}", row.name, doubt(row.guarantee))),
+        ("by", |row| row.name.clone()),
         (">cursors", |row| text::count(row.ray_count)),
         (">wrong", |row| text::count(row.wrong_count)),
         (">time per cursor", |row| some(row.ns_per_ray, text::time)),

@@ -12,13 +12,12 @@ use serde::Serialize;
 use super::error::LeftOutRow;
 use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
-use crate::index::caught;
 use crate::measure::Ask;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
-use crate::visibility::pick::{BACK_ENDS, Build, Builds, CursorRectangle, Pick};
-use crate::visibility::truth::{Bodies, Boxes, Facets, RayIndex, SurfaceIndex};
+use crate::visibility::pick::{CursorRectangle, Pick};
+use crate::visibility::truth::{Bodies, Body, Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
 /// Cursors of a view.
@@ -77,12 +76,12 @@ pub struct Picks<'w> {
     world: &'w World<'w>,
     pickers: Vec<(PickRow, Answer<'w>)>,
     cursors: Vec<Vec<Cursor>>,
-    /// Back ends that refuse the scene.
+    /// Plain loops over too many bodies.
     pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'w> Picks<'w> {
-    /// Builds every back end that can hold the scene.
+    /// Builds every back end but loops over too many bodies.
     pub fn new(world: &'w World<'w>) -> Picks<'w> {
         let of_view = |view| cursors(world.rays(view), world.samples);
         let mut picks = Picks {
@@ -92,10 +91,10 @@ impl<'w> Picks<'w> {
             left_out: Vec::new(),
         };
         match &world.shape {
-            Shape::Boxes(solids) => picks.add_rays(&Boxes::of(solids), |of| of.boxes, "item"),
+            Shape::Boxes(solids) => picks.add_rays(&Boxes::of(solids), "item"),
             Shape::Triangles(surfaces) => {
                 let facets = Facets::solid(surfaces, world.items());
-                picks.add_rays(&facets, |of| of.facets, "triangle");
+                picks.add_rays(&facets, "triangle");
             }
         }
         picks.add_frusta();
@@ -103,27 +102,14 @@ impl<'w> Picks<'w> {
     }
 
     /// Adds back ends along rays: rows of the first item, then of the nearest.
-    fn add_rays<B>(&mut self, all: &Bodies<B>, of: fn(&Builds) -> Build<Bodies<B>>, one: &str) {
+    fn add_rays<B: Body>(&mut self, all: &Bodies<B>, one: &str) {
         let bodies = all.all.len();
-        for row in BACK_ENDS {
+        for row in Bodies::<B>::BACK_ENDS {
             if row.name == "linear" && bodies > MOST_FOR_LOOP {
                 self.left_out.push(too_many(bodies, one, "for each ray"));
                 continue;
             }
-            let built = of(&row.build)(all, self.world.kernel);
-            let pick = built.map(Rc::from).and_then(|pick| {
-                if row.guarantee == Guarantee::Unproven {
-                    self.try_out(row.name, &pick)?;
-                }
-                Ok(pick)
-            });
-            let pick: Rc<dyn Pick> = match pick {
-                Ok(pick) => pick,
-                Err(reason) => {
-                    (self.left_out).push(LeftOutRow::new(["picks", row.name], reason));
-                    continue;
-                }
-            };
+            let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.world.kernel));
             let declared = |question| PickRow {
                 question,
                 name: row.name.to_owned(),
@@ -172,18 +158,6 @@ impl<'w> Picks<'w> {
             };
             self.pickers.push((declared, through));
         }
-    }
-
-    /// Runs code of another crate at every cursor once, to panic here or never.
-    fn try_out(&self, name: &'static str, pick: &Rc<dyn Pick>) -> Result<(), String> {
-        let mut hits = Vec::new();
-        let ask = || {
-            for cursor in self.cursors.iter().flatten() {
-                pick.first(&cursor.ray);
-                pick.nearest(&cursor.ray, NEAREST, &mut hits);
-            }
-        };
-        caught(ask).map_err(|message| format!("'{name}' panicked: {message}"))
     }
 
     /// Every row; the ids are the answers at all cursors of a view in turn.

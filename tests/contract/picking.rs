@@ -1,25 +1,22 @@
-//! Picking back ends that declare exactness return the answer of a plain loop.
+//! Every back end of picking returns the answer of a plain loop.
 
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene, SeededRng, WorldBox};
-use cullbench::visibility::pick::{self, Hit, Pick};
+use cullbench::visibility::pick::{Hit, Linear, Pick};
 use cullbench::visibility::truth::{Boxes, Facets};
 use cullbench::visibility::{Ray, Solids};
 use glam::DVec3;
 
-/// Back ends of picking that declare nothing may differ from the exact answer where
-/// depths are equal or rounded, but not in the open: on rays and boxes without any grid
-/// the answers are the same.
 #[test]
-fn peers_pick_what_the_reference_picks() {
+fn back_ends_pick_what_the_reference_picks() {
     let mut rng = SeededRng::new(5);
     let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
     let boxes = (0..300).map(&mut random).collect::<Vec<_>>();
     let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
     let boxes = Boxes::of(&solids);
-    let reference = pick::Linear(boxes.clone());
-    for row in pick::BACK_ENDS {
-        let back_end = (row.build.boxes)(&boxes, Kernel::best()).unwrap();
+    let reference = Linear(boxes.clone());
+    for row in Boxes::BACK_ENDS {
+        let back_end = (row.build)(&boxes, Kernel::best());
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
         let mut met = 0;
         for _ in 0..300 {
@@ -46,13 +43,13 @@ fn peers_pick_what_the_reference_picks() {
 
 /// The same of triangles: of spheres, which no ray of these meets on an edge.
 #[test]
-fn peers_pick_the_triangles_that_the_reference_picks() {
+fn back_ends_pick_the_triangles_that_the_reference_picks() {
     let scene = scene::load("mesh:spheres:n=26000", &Default::default()).unwrap();
     let surfaces = scene.surfaces.as_ref().expect("a mesh has triangles");
     let facets = Facets::solid(surfaces, scene.items.len());
     let bounds = scene.world_bounds();
-    let rows = pick::BACK_ENDS.iter();
-    let built = rows.map(|row| (row, (row.build.facets)(&facets, Kernel::best()).unwrap()));
+    let rows = Facets::BACK_ENDS.iter();
+    let built = rows.map(|row| (row, (row.build)(&facets, Kernel::best())));
     let built: Vec<_> = built.collect();
     let (_, reference) = &built[0];
     assert_eq!(built[0].0.name, "linear");

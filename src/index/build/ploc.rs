@@ -216,14 +216,6 @@ where
     (order.iter().map(leaf).collect(), ties.count())
 }
 
-/// The preset that was fastest for views and for rays: one item a leaf.
-#[cfg(any(test, feature = "cli"))]
-pub const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
-    max_prims_per_leaf: 1,
-    pre_split: false,
-    ..BvhBuildParams::very_slow_build()
-};
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -232,6 +224,13 @@ mod tests {
     use obvhs::bvh2::builder::build_bvh2;
 
     use super::*;
+
+    /// The slowest preset, one item a leaf.
+    const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
+        max_prims_per_leaf: 1,
+        pre_split: false,
+        ..BvhBuildParams::very_slow_build()
+    };
 
     /// Boxes in no order, some of which share their centre or their bounds.
     fn scattered(n: usize) -> Vec<Aabb> {

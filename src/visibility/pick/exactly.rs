@@ -85,19 +85,15 @@ pub(super) fn nearest<B: Body>(
         met.dedup_by_key(|(item, _)| *item);
     }
     met.sort_unstable_by(|a, b| order::<B>(probe, a, b));
-    let is_within = |a: &Met<B>, last: &Met<B>| probe.compare(&a.1, &last.1).is_le();
-    met.truncate(kept(&met, count, is_within));
+    match count.checked_sub(1).map(|last| met.get(last)) {
+        None => met.clear(),
+        Some(None) => {}
+        Some(Some(&(_, last))) => {
+            met.truncate(met.partition_point(|(_, at)| probe.compare(at, &last).is_le()));
+        }
+    }
     hits.clear();
     hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
-}
-
-/// Length of the first `count` of a sorted list, with all as deep as the last.
-pub(super) fn kept<T>(sorted: &[T], count: usize, is_within: impl Fn(&T, &T) -> bool) -> usize {
-    let Some(last) = count.checked_sub(1) else {
-        return 0;
-    };
-    let end = |last| sorted.partition_point(|met| is_within(met, last));
-    sorted.get(last).map_or(sorted.len(), end)
 }
 
 /// The truth of picking, by the tree of the truth of samples.

@@ -4,16 +4,13 @@
 //! cursor's frustum.
 
 mod exactly;
-mod obvhs;
 mod wide_ray;
-
-use std::cmp::Ordering;
 
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
-use crate::visibility::truth::{Boxes, Facets};
+use crate::visibility::truth::{Bodies, Body};
 use crate::visibility::{Guarantee, Ray, Rays, Row};
 
 pub use exactly::Linear;
@@ -22,26 +19,18 @@ pub use wide_ray::WideRay;
 #[cfg(test)]
 mod tests;
 
-/// All back ends, the reference first.
-pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, guarantee, summary, build }
-    "linear", Guarantee::Exact, "every box or triangle, in exact arithmetic: the reference",
-        Builds {
-            boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
-            facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
-        };
-    "wide-ray", Guarantee::Exact,
-        "16-wide tree, sixteen slab tests at once, the last step exact",
-        Builds {
-            boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel))),
-            facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel))),
-        };
-    // Rays, nodes and boxes are rounded to f32.
-    obvhs::NAME, Guarantee::Unproven, "crate obvhs, eight-wide quantised tree, its ray_traverse",
-        Builds {
-            boxes: |boxes, _| obvhs::Obvhs::boxed(boxes),
-            facets: |facets, _| obvhs::Obvhs::boxed(facets),
-        };
-};
+impl<B: Body> Bodies<B> {
+    /// All back ends of picking, the reference first.
+    ///
+    /// [Exact](Guarantee::Exact) answers are those of exact arithmetic, ties included.
+    pub const BACK_ENDS: &'static [BackEnd<B>] = rows! { BackEnd { name, guarantee, summary, build }
+        "linear", Guarantee::Exact, "every box or triangle, in exact arithmetic: the reference",
+            |bodies, _| Box::new(Linear(bodies.clone()));
+        "wide-ray", Guarantee::Exact,
+            "16-wide tree, sixteen slab tests at once, the last step exact",
+            |bodies, kernel| Box::new(WideRay::of(bodies, kernel));
+    };
+}
 
 /// An item that a ray meets, and where.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -50,14 +39,6 @@ pub struct Hit {
     pub item: ItemId,
     /// Depth at which the ray enters it, rounded.
     pub depth: f64,
-}
-
-impl Hit {
-    /// Order by depth, then by id.
-    fn order(&self, other: &Hit) -> Ordering {
-        let by_depth = self.depth.total_cmp(&other.depth);
-        by_depth.then(self.item.cmp(&other.item))
-    }
 }
 
 /// The items of a scene, to be picked by rays.
@@ -76,28 +57,8 @@ pub trait Pick: Send + Sync {
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
 }
 
-/// Builds a back end over bodies, for an instruction set if it has a choice.
-///
-/// Deterministic.
-///
-/// # Errors
-/// The reason for which it cannot hold the items or failed, in a line.
-pub type Build<Bodies> = fn(&Bodies, Kernel) -> Result<Box<dyn Pick>, String>;
-
-/// A row of the table of back ends.
-///
-/// [Exact](Guarantee::Exact) answers are those of exact arithmetic, ties
-/// included.
-pub type BackEnd = Row<Builds>;
-
-/// Functions that build a back end.
-#[derive(Clone, Copy, Debug)]
-pub struct Builds {
-    /// Builds it over boxes.
-    pub boxes: Build<Boxes>,
-    /// Builds it over triangles.
-    pub facets: Build<Facets>,
-}
+/// A row of the table of back ends: builds one for an instruction set. Deterministic.
+pub type BackEnd<B> = Row<fn(&Bodies<B>, Kernel) -> Box<dyn Pick>>;
 
 /// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower
 /// right one. Closed.

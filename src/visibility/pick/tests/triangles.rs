@@ -18,9 +18,10 @@ fn ray(origin: DVec3, direction: DVec3) -> Ray {
 }
 
 /// Every back end over triangles.
-fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
-    let built = |row: &'static BackEnd| (row, (row.build.facets)(facets, Kernel::best()).unwrap());
-    BACK_ENDS.iter().map(built).collect()
+fn triangle_back_ends(facets: &Facets) -> Vec<(&'static str, Box<dyn Pick>)> {
+    let rows = Facets::BACK_ENDS.iter();
+    let built = rows.map(|row| (row.name, (row.build)(facets, Kernel::best())));
+    built.collect()
 }
 
 fn items(hits: &[Hit]) -> Vec<ItemId> {
@@ -35,9 +36,9 @@ fn boxes_as_triangles_are_picked_as_boxes_are() {
     let bounds = scene.bounds;
     let (min, max) = bounds.in_world(scene.origin);
     let built = triangle_back_ends(&facets);
-    assert!(built.len() >= 3);
+    assert!(built.len() >= 2);
     let mut rng = SeededRng::new(11);
-    let (mut met, mut differ) = (0, 0);
+    let mut met = 0;
     let mut hits = Vec::new();
     for _ in 0..3000 {
         let origin = min + (max - min) * rng.point();
@@ -47,16 +48,13 @@ fn boxes_as_triangles_are_picked_as_boxes_are() {
         reference.nearest(&ray, 4, &mut hits);
         let nearest = items(&hits);
         met += usize::from(first.is_some());
-        for (row, pick) in &built {
+        for (name, pick) in &built {
             pick.nearest(&ray, 4, &mut hits);
             let same = pick.first(&ray).map(|hit| hit.item) == first && items(&hits) == nearest;
-            match row.guarantee {
-                Guarantee::Exact => assert!(same, "{}: {ray:?}", row.name),
-                _ => differ += usize::from(!same),
-            }
+            assert!(same, "{name}: {ray:?}");
         }
     }
-    assert!(met > 400 && differ < 30 * built.len(), "{met} {differ}");
+    assert!(met > 400, "{met}");
 }
 
 #[test]
@@ -68,7 +66,7 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
     let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count), Kernel::best());
     let built = triangle_back_ends(&Facets::solid(&surfaces, count));
     let mut rng = SeededRng::new(5);
-    let (mut hidden, mut differ) = (0, 0);
+    let mut hidden = 0;
     let [mut wanted, mut found] = [Vec::new(), Vec::new()];
     for _ in 0..600 {
         let eye = scene.places[rng.below(scene.places.len())].eye;
@@ -78,23 +76,13 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
         truth.nearest(&ray, 8, &mut wanted);
         assert!(wanted.iter().all(|hit| (hit.item as usize) < count));
         hidden += usize::from(first.is_none() && !wanted.is_empty());
-        for (row, pick) in &built {
+        for (name, pick) in &built {
             pick.nearest(&ray, 8, &mut found);
             let same = pick.first(&ray).map(|hit| hit.item) == first;
-            match row.guarantee {
-                Guarantee::Exact => {
-                    assert!(
-                        same && items(&found) == items(&wanted),
-                        "{}: {ray:?}",
-                        row.name
-                    );
-                }
-                _ => differ += usize::from(!same),
-            }
+            assert!(same && items(&found) == items(&wanted), "{name}: {ray:?}");
         }
     }
-    let most = 60 * built.len();
-    assert!(hidden > 0 && differ < most, "{hidden} {differ}");
+    assert!(hidden > 0, "{hidden}");
 }
 
 fn grid(rng: &mut SeededRng, most: usize) -> Vec3 {
