@@ -262,7 +262,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
     let of = |name: &str| wrong[ORDERS.iter().position(|row| row.name == name).unwrap()];
     assert_eq!(of("bsp"), 0, "of {pairs} pairs");
     assert!(cut > 0, "the premise: boxes were cut");
-    assert!(of("centre-distance") > 0 && of("none") > of("centre-distance"));
+    assert!(of("box-distance") > 0 && of("none") > of("box-distance"));
 }
 
 /// Three beams that lie on each other in a circle: no order is right, but that of

@@ -5,7 +5,6 @@ mod bsp;
 use glam::DVec3;
 
 use crate::camera::Camera;
-use crate::index::{Input, RegionIndex, Wide};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::{Guarantee, Row, Solids};
@@ -22,13 +21,8 @@ pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
     "none", "items in the order of their ids", Guarantee::Unproven,
         |of| Some(by_id(of));
-    "tree", "items in the order of the tree 'wide', the same for all views",
-        Guarantee::Unproven, by_tree;
-    "centre-distance", "sorted by the distance of the centre of each box",
-        Guarantee::Unproven,
-        |of| Some(sorted(of, |camera, b| distance(camera, b.min / 2.0 + b.max / 2.0)));
     "box-distance", "sorted by the distance of the nearest point of each box",
-        Guarantee::Unproven, |of| Some(sorted(of, nearest));
+        Guarantee::Unproven, |of| Some(by_distance(of));
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
         Guarantee::Exact, bsp::order;
 };
@@ -79,30 +73,20 @@ where
     }
 }
 
-/// The same list of items for every camera.
-fn fixed(items: impl Iterator<Item = ItemId>) -> Box<dyn DepthOrder> {
-    let all: Vec<Piece> = items.map(Piece::whole).collect();
+/// Items in the order of their ids.
+fn by_id(of: &ToOrder) -> Box<dyn DepthOrder> {
+    let all: Vec<Piece> = (0..of.boxes.boxes.len() as ItemId)
+        .map(Piece::whole)
+        .collect();
     Box::new(move |_: &Camera, pieces: &mut Vec<Piece>| pieces.clone_from(&all))
 }
 
-/// Items in the order of their ids.
-fn by_id(of: &ToOrder) -> Box<dyn DepthOrder> {
-    fixed(0..of.boxes.boxes.len() as ItemId)
-}
-
-/// Items in the order of the packed tree: the output of the object stage, unsorted.
-fn by_tree(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let tree = Wide::build(&Input::new(&of.boxes.outer), &Default::default()).ok();
-    let items = tree.as_ref().and_then(|tree| tree.tree_order());
-    Some(items.map_or_else(|| by_id(of), |items| fixed(items.iter().copied())))
-}
-
-/// Items sorted by a key of their boxes, then by id. O(n log n) per view.
-fn sorted(of: &ToOrder, key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrder> {
+/// Items sorted by [`nearest`], then by id. O(n log n) per view.
+fn by_distance(of: &ToOrder) -> Box<dyn DepthOrder> {
     let boxes = of.boxes.boxes.clone();
     let order = move |camera: &Camera, pieces: &mut Vec<Piece>| {
         let boxes = boxes.iter().zip(0..);
-        let mut keyed: Vec<_> = boxes.map(|(b, item)| (key(camera, b), item)).collect();
+        let mut keyed: Vec<_> = boxes.map(|(b, item)| (nearest(camera, b), item)).collect();
         keyed.sort_unstable_by(|a: &(f64, ItemId), b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         pieces.clear();
         pieces.extend(keyed.into_iter().map(|(_, item)| Piece::whole(item)));
@@ -110,21 +94,16 @@ fn sorted(of: &ToOrder, key: fn(&Camera, &WorldBox) -> f64) -> Box<dyn DepthOrde
     Box::new(order)
 }
 
-fn distance(camera: &Camera, point: DVec3) -> f64 {
-    let away = point - camera.frame.eye;
-    match camera.lens.is_orthographic() {
-        true => away.dot(camera.frame.forward()),
-        false => away.length_squared(),
-    }
-}
-
 /// Distance of the nearest point of a box.
 ///
 /// Squared from the eye; the depth for an orthographic lens.
 fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
-    let point = match camera.lens.is_orthographic() {
-        true => DVec3::select(camera.frame.forward().cmpgt(DVec3::ZERO), b.min, b.max),
-        false => camera.frame.eye.max(b.min).min(b.max),
-    };
-    distance(camera, point)
+    let (eye, forward) = (camera.frame.eye, camera.frame.forward());
+    match camera.lens.is_orthographic() {
+        true => {
+            let point = DVec3::select(forward.cmpgt(DVec3::ZERO), b.min, b.max);
+            (point - eye).dot(forward)
+        }
+        false => (eye.max(b.min).min(b.max) - eye).length_squared(),
+    }
 }
