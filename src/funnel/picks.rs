@@ -4,7 +4,6 @@
 //! object stage everything in the frustum of a cursor. All answers are compared with the
 //! exact ones.
 
-use std::cell::RefCell;
 use std::rc::Rc;
 
 use serde::Serialize;
@@ -117,14 +116,12 @@ impl<'w> Picks<'w> {
                 guarantee: row.guarantee,
                 ..PickRow::default()
             };
-            let (same, hits) = (pick.clone(), RefCell::new(Vec::new()));
+            let same = pick.clone();
             let first: Answer = Box::new(move |_, cursor, out| {
-                out.extend(pick.first(&cursor.ray).map(|hit| hit.item));
+                out.extend(pick.first(&cursor.ray));
             });
             let nearest: Answer = Box::new(move |_, cursor, out| {
-                let hits = &mut *hits.borrow_mut();
-                same.nearest(&cursor.ray, NEAREST, hits);
-                out.extend(hits.iter().map(|hit| hit.item));
+                same.nearest(&cursor.ray, NEAREST, out);
             });
             let first = (declared(PickQuestion::First), first);
             let nearest = (declared(PickQuestion::Nearest), nearest);
@@ -209,9 +206,11 @@ impl<'w> Picks<'w> {
             let ids = (0..).zip(&scene.items).filter(|(_, b)| volume.sees(b));
             ids.map(|(id, _)| id).collect()
         });
+        let mut nearest = Vec::new();
+        exact.nearest(&cursor.ray, NEAREST, &mut nearest);
         Truth {
-            first: Vec::from_iter(exact.first(&cursor.ray).map(|hit| hit.item)),
-            nearest: nearest(exact, &cursor.ray, NEAREST),
+            first: Vec::from_iter(exact.first(&cursor.ray)),
+            nearest,
             met: met_within(exact, rays, &cursor.rectangle),
             in_planes,
         }
@@ -223,12 +222,6 @@ fn too_many(bodies: usize, one: &str, when: &str) -> LeftOutRow {
     let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
     let reason = format!("{found} to test {when}; expected at most {most}");
     LeftOutRow::new(["picks", "linear"], reason)
-}
-
-fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {
-    let mut hits = Vec::new();
-    pick.nearest(ray, count, &mut hits);
-    hits.into_iter().map(|hit| hit.item).collect()
 }
 
 /// Cursors at the centres of a grid over the image.
@@ -282,7 +275,7 @@ fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec
     let mut met = Vec::new();
     for x in [min[0], middle[0], max[0]] {
         for y in [min[1], middle[1], max[1]] {
-            met.extend(nearest(exact, &rays.through(x, y), usize::MAX));
+            exact.nearest(&rays.through(x, y), usize::MAX, &mut met);
         }
     }
     distinct(met)

@@ -120,9 +120,6 @@ pub trait Along: Copy {
     /// Exact order of two such points along the ray.
     fn compare(&self, a: &Self::At, b: &Self::At) -> Ordering;
 
-    /// Depth of a point, rounded.
-    fn depth(at: &Self::At) -> f64;
-
     /// Upper bound of the true depth of a point.
     fn at_most(at: &Self::At) -> f64;
 }

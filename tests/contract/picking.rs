@@ -2,7 +2,7 @@
 
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene, SeededRng, WorldBox};
-use cullbench::visibility::pick::{Hit, Linear, Pick};
+use cullbench::visibility::pick::{Linear, Pick};
 use cullbench::visibility::truth::{Boxes, Facets};
 use cullbench::visibility::{Ray, Solids};
 use glam::DVec3;
@@ -27,15 +27,13 @@ fn back_ends_pick_what_the_reference_picks() {
                 far: 200.0,
             };
             let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
-            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
-            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.name);
+            assert_eq!(found, wanted, "{} {ray:?}", row.name);
             met += usize::from(wanted.is_some());
-            if let (Some(found), Some(wanted)) = (found, wanted) {
-                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
-            }
+            hits.clear();
+            truth.clear();
             back_end.nearest(&ray, 4, &mut hits);
             reference.nearest(&ray, 4, &mut truth);
-            assert!(hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item)));
+            assert_eq!(hits, truth, "{} {ray:?}", row.name);
         }
         assert!(met > 100, "the premise: {met}");
     }
@@ -67,19 +65,16 @@ fn back_ends_pick_the_triangles_that_the_reference_picks() {
             far: 500.0,
         };
         let wanted = reference.first(&ray);
+        truth.clear();
         reference.nearest(&ray, 4, &mut truth);
         met += usize::from(wanted.is_some());
         several += usize::from(truth.len() > 1);
         for (row, back_end) in &built {
             let found = back_end.first(&ray);
-            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
-            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.name);
-            if let (Some(found), Some(wanted)) = (found, wanted) {
-                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
-            }
+            assert_eq!(found, wanted, "{} {ray:?}", row.name);
+            hits.clear();
             back_end.nearest(&ray, 4, &mut hits);
-            let same = hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item));
-            assert!(same, "{} {ray:?}", row.name);
+            assert_eq!(hits, truth, "{} {ray:?}", row.name);
         }
     }
     assert!(met > 50 && several > 20, "the premise: {met} {several}");

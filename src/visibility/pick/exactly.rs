@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Hit, Pick};
+use super::Pick;
 use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
@@ -14,13 +14,6 @@ type Met<B> = (ItemId, <B as Body>::At);
 #[inline]
 fn order<B: Body>(probe: &B::Probe, a: &Met<B>, b: &Met<B>) -> Ordering {
     probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
-}
-
-/// A hit, unless its item is not among the first `items`.
-#[inline]
-fn hit<B: Body>((item, at): Met<B>, items: usize) -> Option<Hit> {
-    let depth = B::Probe::depth(&at);
-    ((item as usize) < items).then_some(Hit { item, depth })
 }
 
 /// The first of the candidates so far that a ray meets.
@@ -56,10 +49,12 @@ impl<B: Body> First<B> {
         }
     }
 
-    /// The first hit, if it is one of the first `items`.
+    /// The first item, if it is one of the first `items`.
     #[inline]
-    pub fn hit(&self, items: usize) -> Option<Hit> {
-        hit::<B>(self.best?, items)
+    pub fn item(&self, items: usize) -> Option<ItemId> {
+        self.best
+            .map(|met| met.0)
+            .filter(|&item| (item as usize) < items)
     }
 }
 
@@ -71,14 +66,14 @@ impl<B: Body> Visit<B> for First<B> {
     }
 }
 
-/// Replaces `hits` by the first `count` items of the meetings.
+/// Appends the first `count` items of the meetings.
 ///
 /// All items as deep as the last of them are included.
 pub(super) fn nearest<B: Body>(
     probe: &B::Probe,
     mut met: Vec<Met<B>>,
     count: usize,
-    hits: &mut Vec<Hit>,
+    out: &mut Vec<ItemId>,
 ) {
     if !B::IS_BOX {
         met.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.compare(&a.1, &b.1)));
@@ -92,21 +87,23 @@ pub(super) fn nearest<B: Body>(
             met.truncate(met.partition_point(|(_, at)| probe.compare(at, &last).is_le()));
         }
     }
-    hits.clear();
-    hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
+    out.extend(met.into_iter().map(|(item, _)| item));
 }
 
 /// The truth of picking, by the tree of the truth of samples.
 impl<B: Body> Pick for BodyIndex<B> {
-    fn first(&self, ray: &Ray) -> Option<Hit> {
-        let found = self.front_of(ray);
-        hit::<B>((*found.front.first()?, found.meeting?), self.items)
+    fn first(&self, ray: &Ray) -> Option<ItemId> {
+        let front = self.front_of(ray).front;
+        front
+            .first()
+            .copied()
+            .filter(|&item| (item as usize) < self.items)
     }
 
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
         let mut met = self.all_along(ray);
         met.retain(|(item, _)| (*item as usize) < self.items);
-        nearest::<B>(&self.probe(ray), met, count, hits);
+        nearest::<B>(&self.probe(ray), met, count, out);
     }
 }
 
@@ -116,18 +113,18 @@ pub struct Linear<B>(pub Bodies<B>);
 
 impl<B: Body> Pick for Linear<B> {
     /// O(n).
-    fn first(&self, ray: &Ray) -> Option<Hit> {
+    fn first(&self, ray: &Ray) -> Option<ItemId> {
         let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
         self.0.all.iter().for_each(|body| first.offer(body));
-        first.hit(self.0.items)
+        first.item(self.0.items)
     }
 
     /// O(n), and sorting what the ray meets.
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
         let probe = B::probe(ray, self.0.origin);
         let counted = |body: &&B| (body.item() as usize) < self.0.items;
         let met = self.0.all.iter().filter(counted);
         let met = met.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
-        nearest::<B>(&probe, met.collect(), count, hits);
+        nearest::<B>(&probe, met.collect(), count, out);
     }
 }

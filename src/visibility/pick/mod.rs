@@ -32,15 +32,6 @@ impl<B: Body> Bodies<B> {
     };
 }
 
-/// An item that a ray meets, and where.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Hit {
-    /// The item.
-    pub item: ItemId,
-    /// Depth at which the ray enters it, rounded.
-    pub depth: f64,
-}
-
 /// The items of a scene, to be picked by rays.
 ///
 /// Solid boxes are met as [`Solids`](crate::visibility::Solids) defines, triangles as
@@ -48,13 +39,13 @@ pub struct Hit {
 pub trait Pick: Send + Sync {
     /// The first item that the ray meets; of several at the same depth the one
     /// with the lowest id.
-    fn first(&self, ray: &Ray) -> Option<Hit>;
+    fn first(&self, ray: &Ray) -> Option<ItemId>;
 
-    /// Replaces `hits` by the `count` items that the ray meets first.
+    /// Appends the `count` items that the ray meets first.
     ///
     /// Ordered by depth, then by id. All items at the depth of the last of them are included,
     /// so there may be more.
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
+    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>);
 }
 
 /// A row of the table of back ends: builds one for an instruction set. Deterministic.

@@ -88,28 +88,20 @@ fn grids(seed: u64) -> [Worlds; 3] {
 
 /// Asks of the first hit and of the nearest few; returns how many answers of
 /// how many differ from the judge's.
-fn differing(
-    first: impl Fn(&Ray) -> Option<Hit>,
-    nearest: impl Fn(&Ray, usize, &mut Vec<Hit>),
-    ray: &Ray,
-    truth: &[(Depth, ItemId)],
-) -> usize {
+fn differing(pick: &dyn Pick, ray: &Ray, truth: &[(Depth, ItemId)]) -> usize {
     let mut wrong = 0;
-    let found = first(ray).map(|hit| hit.item);
-    wrong += usize::from(found != truth.first().map(|met| met.1));
-    let mut hits = vec![Hit {
-        item: 7,
-        depth: 0.0,
-    }];
+    wrong += usize::from(pick.first(ray) != truth.first().map(|met| met.1));
     for count in [0, 1, 2, 5] {
-        nearest(ray, count, &mut hits);
+        // What is there stays.
+        let mut items = vec![7];
+        pick.nearest(ray, count, &mut items);
         let kept = match count.checked_sub(1).map(|last| truth.get(last)) {
             None => 0,
             Some(None) => truth.len(),
             Some(Some(last)) => truth.partition_point(|met| judge::order(&met.0, &last.0).is_le()),
         };
-        let items = hits.iter().map(|hit| hit.item);
-        wrong += usize::from(!items.eq(truth[..kept].iter().map(|met| met.1)));
+        let wanted = [7].into_iter().chain(truth[..kept].iter().map(|met| met.1));
+        wrong += usize::from(!items.into_iter().eq(wanted));
     }
     wrong
 }
@@ -134,21 +126,10 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 let tied = |pair: &[(Depth, ItemId)]| judge::order(&pair[0].0, &pair[1].0).is_eq();
                 ties += usize::from(truth.windows(2).take(1).any(tied));
                 for (name, back_end) in &built {
-                    let first = |ray: &Ray| back_end.first(ray);
-                    let nearest =
-                        |ray: &Ray, count, hits: &mut Vec<Hit>| back_end.nearest(ray, count, hits);
-                    let wrong = differing(first, nearest, &ray, &truth);
-                    assert_eq!(wrong, 0, "{name} {ray:?}");
+                    assert_eq!(differing(&**back_end, &ray, &truth), 0, "{name} {ray:?}");
                 }
                 for (kernel, wide) in &wide {
-                    let first = |ray: &Ray| wide.first(ray);
-                    let nearest =
-                        |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest(ray, count, hits);
-                    assert_eq!(
-                        differing(first, nearest, &ray, &truth),
-                        0,
-                        "{kernel} {ray:?}"
-                    );
+                    assert_eq!(differing(wide, &ray, &truth), 0, "{kernel} {ray:?}");
                 }
             }
         }
@@ -175,7 +156,7 @@ fn boxes_of_any_size_are_picked_alike() {
             let truth = all_judged(&ray, &solids);
             met += usize::from(!truth.is_empty());
             for (name, back_end) in &built {
-                let found = back_end.first(&ray).map(|hit| hit.item);
+                let found = back_end.first(&ray);
                 assert_eq!(found, truth.first().map(|t| t.1), "{name} {unit:e} {ray:?}");
             }
         }
@@ -204,13 +185,7 @@ fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
         let truth = all_judged(&ray, &solids);
         met += usize::from(!truth.is_empty());
         for (kernel, wide) in &wide {
-            let first = |ray: &Ray| wide.first(ray);
-            let nearest = |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest(ray, count, hits);
-            assert_eq!(
-                differing(first, nearest, &ray, &truth),
-                0,
-                "{kernel} {ray:?}"
-            );
+            assert_eq!(differing(wide, &ray, &truth), 0, "{kernel} {ray:?}");
         }
     }
     assert!(met > 200, "the premise: {met}");
@@ -236,6 +211,8 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
                 far: f64::INFINITY,
             };
             assert_eq!(wide.first(&ray), reference.first(&ray), "{name} {ray:?}");
+            hits.clear();
+            truth.clear();
             wide.nearest(&ray, 3, &mut hits);
             reference.nearest(&ray, 3, &mut truth);
             assert_eq!(hits, truth, "{name} {ray:?}");
@@ -286,7 +263,7 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
             for row in 0..grid.height {
                 for column in 0..grid.width {
                     let picked = wide.first(&rays.sample(grid, column, row));
-                    let picked = picked.map_or(NO_ITEM, |hit| hit.item);
+                    let picked = picked.unwrap_or(NO_ITEM);
                     let front = truth.front[(row * grid.width + column) as usize];
                     assert_eq!(picked, front, "{name} {column} {row}");
                 }
@@ -324,10 +301,11 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
             for (x, y) in (0..9).map(|i| (f64::from(i % 3) / 2.0, f64::from(i / 3) / 2.0)) {
                 let ([x0, y0], [x1, y1]) = (rectangle.min, rectangle.max);
                 let ray = rays.through(between(x0, x1, x), between(y0, y1, y));
+                hits.clear();
                 wide.nearest(&ray, usize::MAX, &mut hits);
                 met += hits.len();
                 for hit in &hits {
-                    assert!(items.binary_search(&hit.item).is_ok(), "{half} {hit:?}");
+                    assert!(items.binary_search(hit).is_ok(), "{half} {hit}");
                 }
             }
             found += items.len();

@@ -4,9 +4,10 @@
 //! slack of the first are decided exactly at the end. A triangle fills little of its box, so
 //! each one whose box may be entered before what was found is tested exactly at once.
 
+use super::Pick;
 use super::exactly::{self, First};
-use super::{Hit, Pick};
 use crate::kernel::{Isa, Kernel, Work};
+use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Candidates, Visit};
 
@@ -23,20 +24,20 @@ impl<B: Body> WideRay<B> {
 
 impl<B: Body> Pick for WideRay<B> {
     #[inline]
-    fn first(&self, ray: &Ray) -> Option<Hit> {
+    fn first(&self, ray: &Ray) -> Option<ItemId> {
         let of = &self.0;
         if B::IS_BOX && !of.tree.is_passed_by(ray) {
             return of.kernel.run(SearchFirst(of, ray));
         }
         let mut first = First::<B>::new(of.probe(ray), ray.far);
         of.walk(ray, &mut first);
-        first.hit(of.items)
+        first.item(of.items)
     }
 
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
         let of = &self.0;
         if count == 0 || of.tree.is_passed_by(ray) {
-            return hits.clear();
+            return;
         }
         let probe = of.probe(ray);
         let met = match B::IS_BOX {
@@ -52,7 +53,7 @@ impl<B: Body> Pick for WideRay<B> {
                 found.met
             }
         };
-        exactly::nearest::<B>(&probe, met, count, hits);
+        exactly::nearest::<B>(&probe, met, count, out);
     }
 }
 
@@ -60,10 +61,10 @@ impl<B: Body> Pick for WideRay<B> {
 struct SearchFirst<'a, B>(&'a BodyIndex<B>, &'a Ray);
 
 impl<B: Body> Work for SearchFirst<'_, B> {
-    type Output = Option<Hit>;
+    type Output = Option<ItemId>;
 
     #[inline(always)]
-    fn run<I: Isa>(self, isa: I) -> Option<Hit> {
+    fn run<I: Isa>(self, isa: I) -> Option<ItemId> {
         let SearchFirst(of, ray) = self;
         let slabs = of.tree.slabs(ray);
         let mut first = First::<B>::new(of.probe(ray), ray.far);
@@ -80,7 +81,7 @@ impl<B: Body> Work for SearchFirst<'_, B> {
             }
             None => of.walk_in_f64(ray, |body| first.offer(body)),
         }
-        first.hit(of.items)
+        first.item(of.items)
     }
 }
 

@@ -70,11 +70,6 @@ impl Along for Probe {
     }
 
     #[inline(always)]
-    fn depth(at: &Crossing) -> f64 {
-        at.depth
-    }
-
-    #[inline(always)]
     fn at_most(at: &Crossing) -> f64 {
         at.depth + GUARD * at.depth.abs()
     }

@@ -95,11 +95,6 @@ impl Along for TriangleProbe {
     }
 
     #[inline(always)]
-    fn depth(at: &Meeting) -> f64 {
-        at.depth
-    }
-
-    #[inline(always)]
     fn at_most(at: &Meeting) -> f64 {
         at.depth + at.error
     }

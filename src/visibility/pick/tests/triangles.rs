@@ -24,8 +24,11 @@ fn triangle_back_ends(facets: &Facets) -> Vec<(&'static str, Box<dyn Pick>)> {
     built.collect()
 }
 
-fn items(hits: &[Hit]) -> Vec<ItemId> {
-    hits.iter().map(|hit| hit.item).collect()
+/// The nearest items.
+fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {
+    let mut items = Vec::new();
+    pick.nearest(ray, count, &mut items);
+    items
 }
 
 #[test]
@@ -39,19 +42,15 @@ fn boxes_as_triangles_are_picked_as_boxes_are() {
     assert!(built.len() >= 2);
     let mut rng = SeededRng::new(11);
     let mut met = 0;
-    let mut hits = Vec::new();
     for _ in 0..3000 {
         let origin = min + (max - min) * rng.point();
         let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.2);
         let ray = ray(origin, direction);
-        let first = reference.first(&ray).map(|hit| hit.item);
-        reference.nearest(&ray, 4, &mut hits);
-        let nearest = items(&hits);
+        let (first, wanted) = (reference.first(&ray), nearest(&reference, &ray, 4));
         met += usize::from(first.is_some());
         for (name, pick) in &built {
-            pick.nearest(&ray, 4, &mut hits);
-            let same = pick.first(&ray).map(|hit| hit.item) == first && items(&hits) == nearest;
-            assert!(same, "{name}: {ray:?}");
+            assert_eq!(pick.first(&ray), first, "{name}: {ray:?}");
+            assert_eq!(nearest(&**pick, &ray, 4), wanted, "{name}: {ray:?}");
         }
     }
     assert!(met > 400, "{met}");
@@ -67,19 +66,16 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
     let built = triangle_back_ends(&Facets::solid(&surfaces, count));
     let mut rng = SeededRng::new(5);
     let mut hidden = 0;
-    let [mut wanted, mut found] = [Vec::new(), Vec::new()];
     for _ in 0..600 {
         let eye = scene.places[rng.below(scene.places.len())].eye;
         let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.5);
         let ray = ray(eye, direction);
-        let first = truth.first(&ray).map(|hit| hit.item);
-        truth.nearest(&ray, 8, &mut wanted);
-        assert!(wanted.iter().all(|hit| (hit.item as usize) < count));
+        let (first, wanted) = (truth.first(&ray), nearest(&truth, &ray, 8));
+        assert!(wanted.iter().all(|&item| (item as usize) < count));
         hidden += usize::from(first.is_none() && !wanted.is_empty());
         for (name, pick) in &built {
-            pick.nearest(&ray, 8, &mut found);
-            let same = pick.first(&ray).map(|hit| hit.item) == first;
-            assert!(same && items(&found) == items(&wanted), "{name}: {ray:?}");
+            assert_eq!(pick.first(&ray), first, "{name}: {ray:?}");
+            assert_eq!(nearest(&**pick, &ray, 8), wanted, "{name}: {ray:?}");
         }
     }
     assert!(hidden > 0, "{hidden}");
@@ -98,7 +94,6 @@ fn every_instruction_set_finds_what_testing_all_finds() {
     let mut rng = SeededRng::new(17);
     let sizes = [0.0, 1e-30, -6e-17, 0.25, -1.0, 1.0, 3000.0];
     let (mut met, mut several) = (0, 0);
-    let [mut found, mut wanted] = [Vec::new(), Vec::new()];
     for n in [0, 1, 15, 300] {
         let mut facet = |i: usize| {
             let at = grid(&mut rng, 12);
@@ -134,10 +129,10 @@ fn every_instruction_set_finds_what_testing_all_finds() {
             let first = linear.first(&ray);
             met += usize::from(first.is_some());
             for count in [0, 1, 3, 9] {
-                linear.nearest(&ray, count, &mut wanted);
+                let wanted = nearest(&linear, &ray, count);
                 several += usize::from(wanted.len() > 1);
                 for (kernel, wide) in &wide {
-                    wide.nearest(&ray, count, &mut found);
+                    let found = nearest(wide, &ray, count);
                     assert_eq!(found, wanted, "{kernel} {count} {ray:?}");
                     assert_eq!(wide.first(&ray), first, "{kernel} {ray:?}");
                 }
