@@ -16,9 +16,7 @@ use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
 use crate::visibility::fragment::order::{self, ORDERS};
-use crate::visibility::fragment::{
-    self, DepthOrder, OrderErrors, Piece, Tally, ToOrder, draw_orders,
-};
+use crate::visibility::fragment::{self, DepthOrder, OrderErrors, Piece, Tally, draw_orders};
 use crate::visibility::truth::{Crossing, Probe, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, Solids};
 
@@ -74,13 +72,10 @@ pub struct Orders<'w> {
 impl Left {
     fn of(world: &World, all: &Solids, items: &[ItemId], is_all: bool) -> Left {
         let boxes = all.some(items);
-        let to_order = ToOrder {
-            boxes: &boxes,
-            are_solid: world.shape.boxes().is_some(),
-        };
+        let are_solid = world.shape.boxes().is_some();
         let wanted = ORDERS.iter();
         let wanted = wanted.filter(|row| is_all || SORTED.contains(&row.name));
-        let built = wanted.filter_map(|row| Some((row, (row.build)(&to_order)?)));
+        let built = wanted.filter_map(|row| Some((row, (row.build)(&boxes, are_solid)?)));
         Left {
             orders: built.collect(),
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),

@@ -18,7 +18,7 @@ pub use canvas::{Canvas, Rectangle, Screen, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
 pub use draw::{Drawable, Drawn, Tally, Tests};
 pub use errors::{OrderErrors, draw_orders};
-pub use order::{DepthOrder, Piece, ToOrder};
+pub use order::{DepthOrder, Piece};
 
 #[cfg(test)]
 mod tests;

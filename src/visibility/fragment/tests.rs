@@ -63,17 +63,10 @@ fn drawn_in(
     (tally, errors.unwrap())
 }
 
-fn to_order(boxes: &Solids) -> ToOrder<'_> {
-    ToOrder {
-        boxes,
-        are_solid: true,
-    }
-}
-
 /// The orders of boxes, ready for them.
 fn orders(solids: &Solids) -> Vec<(&'static OrderRow, Box<dyn DepthOrder>)> {
     let built = ORDERS.iter().filter_map(|row| {
-        let order = (row.build)(&to_order(solids))?;
+        let order = (row.build)(solids, true)?;
         Some((row, order))
     });
     built.collect()
@@ -336,7 +329,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
 }
 
 fn of_boxes(name: &str, solids: &Solids) -> Box<dyn DepthOrder> {
-    (row(name).build)(&to_order(solids)).unwrap()
+    (row(name).build)(solids, true).unwrap()
 }
 
 fn row(name: &str) -> &'static order::OrderRow {

@@ -11,7 +11,7 @@
 //! are too many parts or planes, and for a ray within a plane both sides are on the eye's
 //! side.
 
-use super::{DepthOrder, Piece, ToOrder, nearest};
+use super::{DepthOrder, Piece, nearest};
 use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
@@ -28,12 +28,6 @@ const ROOM: usize = 1 << 14;
 const MOST_PLANES: usize = 64;
 /// Cost of a cut, in boxes of imbalance.
 const COST_OF_CUT: usize = 8;
-
-/// Cuts boxes by planes; no order of triangles.
-pub fn order(of: &ToOrder) -> Option<Box<dyn DepthOrder>> {
-    let order = || Box::new(parted(of.boxes)) as Box<dyn DepthOrder>;
-    of.are_solid.then(order)
-}
 
 /// A plane across an axis, and the nodes above and below it.
 #[derive(Clone, Copy, Debug)]

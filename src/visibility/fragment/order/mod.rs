@@ -12,7 +12,9 @@ use crate::visibility::{Guarantee, Row, Solids};
 pub use bsp::{Partition, parted, parted_within};
 
 /// A row of the table of orders: prepares one for items, if it can order them.
-pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
+///
+/// `true` for solid boxes, which can be cut; else the boxes are about the items.
+pub type OrderRow = Row<fn(&Solids, bool) -> Option<Box<dyn DepthOrder>>>;
 
 /// All orders.
 ///
@@ -20,21 +22,13 @@ pub type OrderRow = Row<fn(&ToOrder) -> Option<Box<dyn DepthOrder>>>;
 /// round, but where it says so ([`DepthOrder::exception`]).
 pub const ORDERS: &[OrderRow] = rows! { OrderRow { name, summary, guarantee, build }
     "none", "items in the order of their ids", Guarantee::Unproven,
-        |of| Some(by_id(of));
+        |items, _| Some(by_id(items));
     "box-distance", "sorted by the distance of the nearest point of each box",
-        Guarantee::Unproven, |of| Some(by_distance(of));
+        Guarantee::Unproven, |items, _| Some(by_distance(items));
     "bsp", "planes through faces of boxes, which are cut where they cross: exact",
-        Guarantee::Exact, bsp::order;
+        Guarantee::Exact,
+        |items, are_solid| are_solid.then(|| Box::new(parted(items)) as _);
 };
-
-/// Input of an order.
-#[derive(Clone, Copy, Debug)]
-pub struct ToOrder<'a> {
-    /// The items as solid boxes, or the boxes about them.
-    pub boxes: &'a Solids,
-    /// `true` for solid boxes, which can be cut.
-    pub are_solid: bool,
-}
 
 /// An item to be drawn, or a part of it.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -74,16 +68,14 @@ where
 }
 
 /// Items in the order of their ids.
-fn by_id(of: &ToOrder) -> Box<dyn DepthOrder> {
-    let all: Vec<Piece> = (0..of.boxes.boxes.len() as ItemId)
-        .map(Piece::whole)
-        .collect();
+fn by_id(items: &Solids) -> Box<dyn DepthOrder> {
+    let all: Vec<Piece> = (0..items.boxes.len() as ItemId).map(Piece::whole).collect();
     Box::new(move |_: &Camera, pieces: &mut Vec<Piece>| pieces.clone_from(&all))
 }
 
 /// Items sorted by [`nearest`], then by id. O(n log n) per view.
-fn by_distance(of: &ToOrder) -> Box<dyn DepthOrder> {
-    let boxes = of.boxes.boxes.clone();
+fn by_distance(items: &Solids) -> Box<dyn DepthOrder> {
+    let boxes = items.boxes.clone();
     let order = move |camera: &Camera, pieces: &mut Vec<Piece>| {
         let boxes = boxes.iter().zip(0..);
         let mut keyed: Vec<_> = boxes.map(|(b, item)| (nearest(camera, b), item)).collect();
