@@ -139,9 +139,6 @@ pub struct Cones<const N: usize> {
     triangles: Vec<[[u64; LANES]; N]>,
 }
 
-/// One cone per cluster.
-pub type SafeCones = Cones<1>;
-
 impl<const N: usize> Cones<N> {
     /// Fits the cones. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> Cones<N> {

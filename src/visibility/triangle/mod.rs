@@ -14,7 +14,7 @@ use crate::query::Bits;
 use crate::visibility::{Guarantee, Row};
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
-pub use cones::{Cone, Cones, SafeCones};
+pub use cones::{Cone, Cones};
 pub use exact::{Eye, exact_normal, faces, normal};
 
 /// All back ends of this stage.
@@ -24,7 +24,7 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = rows! { TriangleRow { name, guarantee,
         |clusters| Box::new(per_triangle::PerTriangle::of(clusters));
     "cone-f32-safe", Guarantee::Conservative,
         "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
-        |clusters| Box::new(SafeCones::of(clusters));
+        |clusters| Box::new(Cones::<1>::of(clusters));
     "several-cones", Guarantee::Conservative,
         "Four cones per cluster, each of triangles of similar orientation, rounding proven",
         |clusters| Box::new(Cones::<4>::of(clusters));
