@@ -164,7 +164,7 @@ impl Chain {
     }
 }
 
-pub const PORTAL_CLIP: &str = "portal-clip";
+const PORTAL_CLIP: &str = "portal-clip";
 const MASKED_INNER: &str = "masked-inner";
 /// The test that takes every item for solid.
 pub const Z: &str = "z-test";

@@ -69,12 +69,14 @@ impl CursorRectangle {
         CursorRectangle { min, max }
     }
 
-    /// The camera that sees what the rays through the rectangle see: the same eye
-    /// (moved aside for an orthographic lens), near and far.
+    /// Planes that hold what the rays through the rectangle meet, in the f32 of a scene.
+    ///
+    /// Those of a camera with the same eye (moved aside for an orthographic lens), near and
+    /// far; moved outward by what they may be off.
     ///
     /// # Errors
-    /// An empty rectangle; one that f64 cannot tell from a point.
-    pub fn camera(&self, rays: &Rays) -> Result<Camera, CameraError> {
+    /// An empty rectangle; one that f64 cannot tell from a point; those of [`Camera::volume`].
+    pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
         let camera = &rays.camera;
         let [left, right, bottom, top] = rays.window;
         let across = |x: f64| left + (right - left) * x;
@@ -94,14 +96,6 @@ impl CursorRectangle {
             }
             false => Lens::off_axis(window.map(|slope| slope * near), near, far)?,
         };
-        Ok(Camera { frame, lens })
-    }
-
-    /// Its planes in the f32 of a scene, moved outward by what they may be off.
-    ///
-    /// # Errors
-    /// The errors of [`CursorRectangle::camera`] and [`Camera::volume`].
-    pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
-        self.camera(rays)?.volume(&PlaneOptions::default(), around)
+        Camera { frame, lens }.volume(&PlaneOptions::default(), around)
     }
 }
