@@ -215,7 +215,6 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
 
 /// Headings of tables that say all by themselves.
 const PLAIN: [&str; 18] = [
-    "bound",
     "boxes",
     "cameras",
     "column",
