@@ -56,8 +56,12 @@ pub(super) struct ErrorCount {
 impl ErrorCount {
     /// Adds a sample: all its layers, and the exact order of two of them.
     ///
-    /// Leaves the layers in the order in which they were drawn, one for each item.
-    pub fn sample<A>(&mut self, layers: &mut Vec<Layer<A>>, compare: impl Fn(&A, &A) -> Ordering) {
+    /// Returns how many pass the z-test when they come.
+    pub fn sample<A>(
+        &mut self,
+        layers: &mut Vec<Layer<A>>,
+        compare: impl Fn(&A, &A) -> Ordering,
+    ) -> u64 {
         // A ray along a cut meets both parts: the first counts.
         layers.sort_by_key(|layer| (layer.item, layer.when));
         layers.dedup_by_key(|layer| layer.item);
@@ -70,6 +74,12 @@ impl ErrorCount {
             rank += u32::from(compare(&layers[pair[0]].at, &layers[pair[1]].at).is_lt());
             ranked[pair[1]].1 = rank;
         }
+        // Nearer than all before, of a tie the lower id.
+        let (mut front, mut shaded) = ((u32::MAX, ItemId::MAX), 0);
+        for &(item, rank) in &ranked {
+            shaded += u64::from((rank, item) < front);
+            front = front.min((rank, item));
+        }
         // Painted from the last to the first: the first of the list stays.
         self.wrong_samples += u64::from(ranked.first().is_some_and(|first| first.1 > 0));
         if ranked != self.ranked {
@@ -78,6 +88,7 @@ impl ErrorCount {
             }
             self.ranked = ranked;
         }
+        shaded
     }
 
     /// Adds the pairs of a sample, unless there are too many.
@@ -204,21 +215,9 @@ pub fn draw_orders<B: Drawable, F: Fn(ItemId, &B::Probe, &B::At) -> bool>(
                 let when = parts.when::<B>(sample, (&probe, &at))?;
                 Some(Layer { when, item, at })
             }));
-            errors.sample(&mut layers, |a, b| probe.compare(a, b));
             tally.fragment_count += fragments;
             tally.covered_count += u64::from(!layers.is_empty());
-            // The z-test: nearer than all before, of a tie the lower id.
-            let mut front: Option<&Layer<B::At>> = None;
-            for layer in &layers {
-                let passes = front.is_none_or(|front| {
-                    let order = probe.compare(&layer.at, &front.at);
-                    order.then(layer.item.cmp(&front.item)).is_lt()
-                });
-                if passes {
-                    tally.shaded_count += 1;
-                    front = Some(layer);
-                }
-            }
+            tally.shaded_count += errors.sample(&mut layers, |a, b| probe.compare(a, b));
         }
     }
     let all = counts.into_iter();
