@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::item_stages::ItemStages;
 use super::task::{FunnelKey, KeyedTask};
-use super::world::World;
+use super::world::{Shape, World};
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
@@ -124,8 +124,10 @@ impl<'w> Orders<'w> {
     pub fn drawn(&self) -> Result<Vec<OrderRow>, String> {
         let mut rows: Vec<OrderRow> = self.rows().map(OrderRow::new).collect();
         // Processes that only time need no tree of the triangles.
-        let triangles = self.world.shape.triangles();
-        let index = triangles.map(|surfaces| SurfaceIndex::build(surfaces));
+        let index = match &self.world.shape {
+            Shape::Boxes(_) => None,
+            Shape::Triangles(surfaces) => Some(SurfaceIndex::build(surfaces)),
+        };
         for (view, left) in self.views.iter().enumerate() {
             let rays = self.world.rays(view);
             let counts = self.counted(left, rays, index.as_ref());

@@ -117,14 +117,6 @@ impl Shape {
             Shape::Triangles(_) => None,
         }
     }
-
-    /// Triangles, if the items are no solid boxes.
-    pub fn triangles(&self) -> Option<&Arc<Surfaces>> {
-        match self {
-            Shape::Boxes(_) => None,
-            Shape::Triangles(surfaces) => Some(surfaces),
-        }
-    }
 }
 
 /// A camera of the path.
