@@ -145,7 +145,7 @@ impl Stacks {
 ///
 /// 1 for coordinates between 2^-40 and 2^40. Beyond, the areas that the builder
 /// compares would overflow or vanish in f32.
-fn scale_for(items: &[Aabb]) -> f32 {
+pub fn scale_for(items: &[Aabb]) -> f32 {
     let largest = Aabb::union_of(items).reach().max_element();
     let exponent = libm::ilogbf(largest);
     if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
