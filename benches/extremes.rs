@@ -1,7 +1,8 @@
-//! Builds on scenes that break naive structures: the build time and depth-driven memory
-//! of each structure, and the build time of picking by `wide-ray`, on a million unpleasant
-//! items against the uniform scene of the same size, in one run. Exits 3 if a build takes
-//! more than three times as long. `-- --test` runs a thousand items and judges nothing.
+//! Builds on scenes that break naive structures, against the uniform scene.
+//!
+//! Build time and depth-driven memory of each structure, and the build time of picking by
+//! `wide-ray`, on a million unpleasant items, in one run. Exits 3 if a build takes more than
+//! three times as long. `-- --test` runs a thousand items and judges nothing.
 //! Other crates' structures are left out: obvhs by itself takes quadratic time for posts
 //! and nested boxes.
 

@@ -88,7 +88,7 @@ impl<'a> Case<'a> {
 
     /// The depth of a camera's view, at most that of the scene.
     ///
-    /// That of the eye for a scene that is a point, and not zero even there.
+    /// The eye's distance for a scene that is a point, and not zero even there.
     fn depth(&self, camera: &Camera) -> f64 {
         let Scene { bounds, origin, .. } = self.scene();
         let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);

@@ -74,7 +74,7 @@ pub struct TrialPlan {
     /// The tree and the scan of the rules.
     structures: [String; 2],
     schedule: Schedule,
-    /// By task and camera.
+    /// Answers by task and camera.
     expected: Vec<Vec<Answer>>,
     beside: Beside,
     /// Times of the stages, if the scene and the cameras have such.

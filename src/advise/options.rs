@@ -8,9 +8,9 @@ use crate::index::{Execution, StructureSpec};
 use crate::measure::{Setting, Workload};
 use crate::motion::Motion;
 
-/// Largest acceptable error.
+/// Largest acceptable error: relative to the depth of the view, or in radians.
 ///
-/// Of planes relative to the depth of the view, of a camera basis in radians.
+/// The former of planes, the latter of a camera basis.
 pub(super) const TOLERANCE: f64 = 1e-5;
 /// Reason for which rules about nodes do not apply.
 pub(super) const NO_NODES: &str = "the structure taken has no nodes";

@@ -24,7 +24,7 @@ pub struct Trials<'c> {
 
 /// Answers of all tasks.
 pub struct Answered {
-    /// By task and camera.
+    /// The answers by task and camera.
     pub answers: Vec<Vec<Answer>>,
     /// Errors of each judged camera, of tasks that are compared with the truth.
     errors: Vec<Option<Vec<ErrorCount>>>,

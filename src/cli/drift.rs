@@ -129,7 +129,7 @@ fn by_stiffness(report: &DriftReport) -> Table {
     Table::grid(&format!("within {ARM_TOLERANCE:e}"), cells)
 }
 
-/// "x4: 1.2e-4, 3.21 us" of the fewest steps that are precise enough, or the nearest.
+/// The fewest steps that are precise enough, or the nearest: "x4: 1.2e-4, 3.21 us".
 fn within(points: &[ArmPoint]) -> String {
     let is_good = |p: &&ArmPoint| p.position_error <= ARM_TOLERANCE;
     let sound = points.iter().filter(|p| !p.position_error.is_nan());
@@ -142,7 +142,7 @@ fn within(points: &[ArmPoint]) -> String {
     format!("{no}x{}: {:.1e}, {time}", p.substeps, p.position_error)
 }
 
-/// What the methods of arms do, their classical orders and limits of stability.
+/// The methods of arms: what they do, classical orders, limits of stability.
 fn methods(report: &DriftReport) -> Table {
     let columns: [Column<&Stability>; 4] = [
         ("method", |m| m.method.name.to_owned()),

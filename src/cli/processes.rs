@@ -299,7 +299,7 @@ impl Workers {
         self
     }
 
-    /// Starts a worker on the next processor; `layout` decides on where its memory lies.
+    /// Starts a worker on the next processor; `layout` places its memory.
     ///
     /// # Errors
     /// The program cannot be started.

@@ -91,7 +91,9 @@ named! {
     pub enum ArmKind {
         /// A spring on a line behind `sin t`.
         Linear = "linear",
-        /// A spring that stiffens as it is stretched, and a stop at 0.6 that takes all velocity.
+        /// A spring that stiffens as it is stretched, and a stop at 0.6.
+        ///
+        /// The stop takes all velocity.
         Collision = "collision",
     }
 }
@@ -391,8 +393,9 @@ mod tests {
         points.iter().find(is_it).expect(method).position_error
     }
 
-    /// Powers of the step by which the error falls from 1 to 2, to 4 and to 16 steps per
-    /// frame, behind the straight lines that methods get.
+    /// Powers of the step by which the error falls, behind straight lines.
+    ///
+    /// From 1 to 2, to 4 and to 16 steps per frame; methods get the target as such lines.
     fn orders(kind: ArmKind, seconds: f64, method: &Method) -> [f64; 3] {
         let chase = Chase::new(kind, 1e2, 60.0, seconds);
         let way = chase.states(rk4, 200);

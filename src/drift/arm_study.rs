@@ -48,8 +48,9 @@ fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
     trace.abs() <= 1.0 + determinant + SLACK && determinant <= 1.0 + SLACK
 }
 
-/// The `omega h` from which on a method is no longer stable, by bisection; `None` if it
-/// is stable up to [`ALWAYS`].
+/// The least `omega h` at which a method is unstable, by bisection.
+///
+/// `None` if it is stable up to [`ALWAYS`].
 fn limit(method: &Method, zeta: f64) -> Option<f64> {
     let (mut good, mut bad) = (1e-3, ALWAYS);
     if is_stable(method, zeta, bad) {

@@ -85,7 +85,7 @@ impl Period {
 }
 
 impl Method {
-    /// Largest errors of a period, orthogonality and angle; NaN for a basis that is lost.
+    /// Largest errors of a period, orthogonality and angle; NaN if a basis is lost.
     pub fn errors(&self, period: &Period) -> [f64; 2] {
         let exact = &period.exact[usize::from(self.sums_angles)];
         let walked = (self.walk)(period.steps.clone()).into_iter().zip(exact);

@@ -247,8 +247,9 @@ impl RegionIndex for Linear {
         self.scan(0..blocks, volume, cx)
     }
 
-    /// O(moved): overwrites their lanes. Items may become or cease to be empty. A pass over
-    /// all blocks more where the farthest sphere has come nearer.
+    /// O(moved): overwrites their lanes. Items may become or cease to be empty.
+    ///
+    /// A pass over all blocks more where the farthest sphere has come nearer.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.positions.prepare(&self.ids, items.len());
         for (i, &id) in moved.iter().enumerate() {

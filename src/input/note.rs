@@ -46,7 +46,7 @@ pub fn tell_warnings() {
     });
 }
 
-/// Does something whose notes and warnings nobody is told.
+/// Does something without its notes and warnings.
 pub(crate) fn unheard<T>(work: impl FnOnce() -> T) -> T {
     let mut kept = None;
     listening(|listener| kept = listener.take());

@@ -202,7 +202,7 @@ impl KeyedSchedule {
     }
 }
 
-/// The schedule of a timed pass for `cameras` cameras, and the tasks that take part.
+/// The schedule of a timed pass, and the tasks that take part.
 ///
 /// With a `given` schedule it is the part for these tasks, without those that it does not have.
 pub(super) fn scheduled<'a>(

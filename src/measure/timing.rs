@@ -45,7 +45,7 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// Mean time per query of each round that the task took part in, by one of the clocks, ns.
+    /// Mean time per query of each round of the task, by one of the clocks, ns.
     pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
         let rounds = self.samples.chunk_by(|a, b| a.round == b.round);
         let means = rounds.map(|round| {

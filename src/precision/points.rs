@@ -45,7 +45,7 @@ pub struct Precision {
     pub warnings: Vec<String>,
     /// Seed of the sweeps and of the order of the tasks.
     pub seed: u64,
-    /// Errors by the size of items and of ill-conditioned cameras; empty unless requested.
+    /// Errors by size of items and of ill-conditioned cameras, if requested.
     pub sweeps: Vec<SweepRow>,
 }
 

@@ -1,9 +1,9 @@
 //! Error against the size of items and against ill-conditioned cameras.
 //!
-//! By size every test, on cubes strewn about frusta. By how far from zero the world lies,
-//! how small it is, far/near, field of view, aspect, and how nearly up is the direction of
-//! view the six-plane test by every derivation of the planes and in every arithmetic: boxes
-//! are f32 world coordinates, on purpose, and nothing is rebased.
+//! Sizes: every test, on cubes strewn about frusta. Cameras: how far from zero the world
+//! lies, how small it is, far/near, field of view, aspect, and how nearly up is the
+//! direction of view, by the six-plane test with every derivation of the planes and in
+//! every arithmetic. Boxes are f32 world coordinates, on purpose, and nothing is rebased.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -93,8 +93,9 @@ pub struct SweepRow {
 }
 
 impl SweepRow {
-    /// What the sweep is about: of sizes false positives in percent of the visible, of
-    /// cameras missed items in millionths.
+    /// The figure of the row: false positives of sizes, in percent of the visible.
+    ///
+    /// Missed items of cameras, in millionths.
     pub fn error(&self) -> Option<Rate> {
         match self.sweep {
             Sweep::Size => self.excess.map(|rate| rate.per(100.0)),
@@ -113,11 +114,11 @@ const BOXES: usize = 500;
 /// How the planes of a swept test are made.
 #[derive(Clone, Copy)]
 enum Planes {
-    /// As the culling makes them.
+    /// The culling's own planes.
     Own,
-    /// By axes that are cross products in f64, rounded as they come.
+    /// Planes by axes that are cross products in f64, rounded as they come.
     PlainFrame,
-    /// With the silhouettes of the exact test.
+    /// The faces with the silhouettes of the exact test.
     Silhouettes,
 }
 
@@ -130,8 +131,9 @@ struct SweptTest {
     refused: Option<String>,
 }
 
-/// The tests by what they add to the faces, in f32 without epsilon; the exact test with
-/// it and in f64 as well.
+/// The tests by what they add to the faces, in f32 without epsilon.
+///
+/// The exact test also with it, and in f64.
 fn tests_of_sizes() -> Vec<(Culling, Planes)> {
     use CullingTest::{Exact, SixBox, SixPlane, Sphere};
     let moved = PlaneOptions::default();

@@ -174,7 +174,9 @@ pub struct Views {
 /// Times of each reading, by its first view and the number of views.
 type Readings = BTreeMap<(u32, u32), Vec<f64>>;
 
-/// A row of samples.csv up to the CPU time: six names, then process, round, frame and queries.
+/// A row of samples.csv up to the CPU time.
+///
+/// Six names, then process, round, frame and queries.
 type SampleRow = ([String; 6], [u32; 4], f64);
 
 /// The views of a report in the folder it came from, by the text of their keys.

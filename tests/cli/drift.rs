@@ -1,6 +1,7 @@
-//! `drift`: every method, figures of the known size, limits by formulas written here,
-//! and recommendations that follow from the figures beside them. Times are looked at
-//! only as far as choices follow from them.
+//! `drift`: every method, figures of the known size, limits by formulas, advice.
+//!
+//! Recommendations follow from the figures beside them; times are looked at only as far as
+//! choices follow from them.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -194,7 +194,9 @@ impl<C: RadixKey> RadixKey for Coded<C> {
     }
 }
 
-/// The boxes as leaves, those with the same code in the crate's order, and their number.
+/// The boxes as leaves in the order of their codes, and the number of equal codes.
+///
+/// Boxes with one code come in the crate's order.
 fn in_morton_order<C>(boxes: &[Aabb], code: impl Fn(DVec3) -> C) -> (Vec<Bvh2Node>, usize)
 where
     C: RadixKey + Copy + Ord + Send + Sync,

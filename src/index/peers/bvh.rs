@@ -82,7 +82,7 @@ const SMALLEST: f32 = 1e-4;
 /// It takes as long as a build from three eighths moved on, below from three quarters on.
 const LARGE: usize = 10_000;
 
-/// The crate's tree over shapes scaled to a reach of 1,000, its nodes then fitted to them.
+/// The crate's tree over shapes scaled to a reach of 1,000, its nodes then fitted.
 ///
 /// If areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.

@@ -146,7 +146,7 @@ impl Screen {
                 add([x / w, y / w], size / w * ROUNDED + AXES);
                 continue;
             }
-            // Perhaps in front of the near plane, but nobody knows where.
+            // Perhaps in front of the near plane, at a place that rounding hides.
             if w + size * ROUNDED >= self.near {
                 return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
             }

@@ -48,7 +48,7 @@ pub trait Pick: Send + Sync {
     fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>);
 }
 
-/// A row of the table of back ends: builds one for an instruction set. Deterministic.
+/// A row of the table of back ends; builds one for an instruction set.
 pub type BackEnd<B> = Row<fn(&Bodies<B>, Kernel) -> Box<dyn Pick>>;
 
 /// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower
@@ -69,7 +69,7 @@ impl CursorRectangle {
         CursorRectangle { min, max }
     }
 
-    /// Planes that hold what the rays through the rectangle meet, in the f32 of a scene.
+    /// Planes about what rays through the rectangle meet, in the f32 of a scene.
     ///
     /// Those of a camera with the same eye (moved aside for an orthographic lens), near and
     /// far; moved outward by what they may be off.
