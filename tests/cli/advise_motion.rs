@@ -104,7 +104,7 @@ fn policies_are_weighed_without_being_named() {
     );
     for part in [
         "Update policies, side by side:",
-        "Features, measured with and without on the still scene:",
+        "feature             needed",
         "In motion: ",
         "A frame takes ",
         "every=10 ",

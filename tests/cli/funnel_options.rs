@@ -28,7 +28,7 @@ fn every_question_of_picking_is_answered_exactly() {
     let picks = array(city_report(), "picks");
     for question in ["first item", "nearest 8", "all within 4 pixels"] {
         let of_question = || picks.iter().filter(|row| row["question"] == question);
-        assert!(of_question().count() >= 3, "{question}");
+        assert!(of_question().count() >= 2, "{question}");
         for row in of_question().filter(|row| row["guarantee"] != "unproven") {
             assert_eq!(number(row, "wrong_count"), 0.0, "{row}");
             assert_eq!(number(row, "ray_count"), 3.0 * 144.0, "{row}");
