@@ -132,8 +132,8 @@ mishaps! {
         for_ever();
     };
     HangsAsked "hangs-asked" at_query for_ever();
-    // Not before it is timed: to count and to compare takes a few dozen.
-    HangsTimed "hangs-timed" at_query if ASKED.fetch_add(1, Ordering::Relaxed) > 60 {
+    // Not before it is timed: to count and to compare takes 16.
+    HangsTimed "hangs-timed" at_query if ASKED.fetch_add(1, Ordering::Relaxed) > 24 {
         for_ever();
     };
     Aborts "aborts" at_query std::process::abort();

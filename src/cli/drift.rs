@@ -91,7 +91,7 @@ fn bases(report: &DriftReport, all: bool) -> Table {
         (">orthogonality", |r| {
             format!("{:.1e}", r.orthogonality_error)
         }),
-        (">angle, rad", |r| format!("{:.1e}", r.angle_error_rad)),
+        (">angle (rad)", |r| format!("{:.1e}", r.angle_error_rad)),
         (">time per step", |r| time_plus_minus(r.time_per_step)),
         ("description", |r| r.method.summary.to_owned()),
     ];

@@ -120,6 +120,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
     }
     for (counted, subject) in all.iter_mut().zip(subjects) {
         if let (true, Ok(built)) = (counted.verdict.is_ok(), &subject.built) {
+            notice(Some(&subject.spec.label), "counting");
             counted.verdict = compare_batch(workload, built).err().unwrap_or_default();
             if subject.spec.info().kind != Kind::Scan {
                 note_scan(counted, workload.items.len());

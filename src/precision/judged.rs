@@ -1,20 +1,17 @@
 //! Answers of a culling to every camera by the plain loop, and their errors. No
 //! structure and no clock.
 
-use std::ops::Add;
-
 use glam::DVec3;
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
 
-use super::point::{Dimension, Point};
 use crate::camera::Camera;
 use crate::culling::{CameraView, Culling};
-use crate::measure::{Status, blamed};
+use crate::measure::blamed;
 use crate::path::{CameraPath, evenly};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
-use crate::statistics::{Rate, rate_of};
+use crate::statistics::Rate;
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -81,11 +78,11 @@ pub(super) fn chosen(path: &CameraPath, most: usize) -> Vec<Camera> {
 
 /// Errors of the answer to one camera.
 #[derive(Clone, Copy, Default)]
-struct CameraErrors {
-    counts: ErrorCount,
+pub(super) struct CameraErrors {
+    pub counts: ErrorCount,
     /// How deep the deepest false negative reaches into the view, in pixels of
     /// 1080p; 0 if there is none, `None` for a matrix without rays.
-    worst_miss_px: Option<f64>,
+    pub worst_miss_px: Option<f64>,
 }
 
 /// Answers of one culling to every camera, and their errors.
@@ -95,7 +92,7 @@ pub(super) struct Judged {
     pub views: Vec<CameraView>,
     /// Ids of each camera that has a truth.
     pub answers: Vec<Vec<ItemId>>,
-    by_camera: Vec<CameraErrors>,
+    pub by_camera: Vec<CameraErrors>,
     /// Why there are no such views.
     pub refused: Option<String>,
 }
@@ -124,42 +121,6 @@ impl Judged {
             judged.answers.push(answer);
         }
         judged
-    }
-
-    /// The culling's errors as a point of a structure, without a time.
-    pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point {
-        let judged = &self.by_camera[..];
-        let is_judged = self.refused.is_none();
-        let counts: ErrorCount = judged.iter().map(|camera| camera.counts).sum();
-        let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
-        let in_pixels = || judged.iter().filter_map(|c| c.worst_miss_px);
-        let errors = CullingErrors {
-            names: Names::of(&self.culling),
-            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
-            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
-            counts: is_judged.then_some(counts),
-            worst_miss_px: in_pixels().reduce(f64::max),
-            ns_per_item: None,
-            memory_bytes_per_item,
-        };
-        let of = |count: fn(&ErrorCount) -> u64| {
-            Dimension::of(judged.iter().map(|c| count(&c.counts) as f64), f64::add)
-        };
-        let dimensions = vec![
-            of(|c| c.false_negatives),
-            of(|c| c.touch_dropped),
-            of(|c| c.false_positives),
-            Dimension::of(in_pixels(), f64::max),
-            Dimension::fixed(memory_bytes_per_item),
-        ];
-        let mut point = Point::new(structure, errors, dimensions);
-        point.reason = self.refused.clone();
-        point.status = match is_judged {
-            false => Status::Refused,
-            true if counts.false_negatives > 0 => Status::Unsafe,
-            true => Status::Ok,
-        };
-        point
     }
 }
 

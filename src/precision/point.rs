@@ -2,11 +2,14 @@
 //!
 //! Also when one point dominates another.
 
+use std::ops::Add;
+
 use serde::Serialize;
 
-use super::judged::CullingErrors;
+use super::judged::{CullingErrors, Judged, Names};
 use crate::measure::{OverProcesses, Status, Verdict};
-use crate::statistics::{ALPHA, Estimate, dominance, flat, shows_less};
+use crate::statistics::{ALPHA, Estimate, dominance, flat, rate_of, shows_less};
+use crate::verify::ErrorCount;
 
 /// A kind of error or cost; less is better.
 #[derive(Clone, PartialEq, Debug)]
@@ -67,7 +70,7 @@ pub struct Point {
 
 impl Point {
     /// One without a time.
-    pub(super) fn new(structure: &str, errors: CullingErrors, dimensions: Vec<Dimension>) -> Point {
+    fn new(structure: &str, errors: CullingErrors, dimensions: Vec<Dimension>) -> Point {
         Point {
             structure: structure.to_owned(),
             errors,
@@ -80,6 +83,43 @@ impl Point {
             dimensions,
             task: None,
         }
+    }
+
+    /// A culling's errors as a point of a structure, without a time.
+    pub(super) fn of(judged: &Judged, structure: &str, memory_bytes_per_item: f64) -> Point {
+        let (refused, culling) = (&judged.refused, &judged.culling);
+        let judged = &judged.by_camera[..];
+        let is_judged = refused.is_none();
+        let counts: ErrorCount = judged.iter().map(|camera| camera.counts).sum();
+        let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
+        let in_pixels = || judged.iter().filter_map(|c| c.worst_miss_px);
+        let errors = CullingErrors {
+            names: Names::of(culling),
+            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
+            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
+            counts: is_judged.then_some(counts),
+            worst_miss_px: in_pixels().reduce(f64::max),
+            ns_per_item: None,
+            memory_bytes_per_item,
+        };
+        let of = |count: fn(&ErrorCount) -> u64| {
+            Dimension::of(judged.iter().map(|c| count(&c.counts) as f64), f64::add)
+        };
+        let dimensions = vec![
+            of(|c| c.false_negatives),
+            of(|c| c.touch_dropped),
+            of(|c| c.false_positives),
+            Dimension::of(in_pixels(), f64::max),
+            Dimension::fixed(memory_bytes_per_item),
+        ];
+        let mut point = Point::new(structure, errors, dimensions);
+        point.reason = refused.clone();
+        point.status = match is_judged {
+            false => Status::Refused,
+            true if counts.false_negatives > 0 => Status::Unsafe,
+            true => Status::Ok,
+        };
+        point
     }
 
     /// Takes over what is wrong; true if nothing is.
@@ -137,8 +177,6 @@ pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usiz
 
 #[cfg(test)]
 mod tests {
-    use std::ops::Add;
-
     use super::*;
 
     /// A point with false negatives, dropped touches and false positives, each the
