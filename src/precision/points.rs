@@ -210,7 +210,7 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     for (index, way) in built.ways().into_iter().enumerate() {
         let Way { indexes, judged } = way;
         let memory = indexes.of(judged.culling.test).memory().total() as f64 / items as f64;
-        let mut point = Point::of(&judged, indexes.structure, memory);
+        let mut point = Point::of(judged, indexes.structure, memory);
         let is_made = judged.refused.is_none();
         let is_sound = is_made && point.accepts(way.check(items).err().as_ref());
         points.push(point);
