@@ -9,7 +9,9 @@ mod table;
 pub(crate) use error::gigabytes;
 pub use error::{InputError, Result, bare};
 pub use file::{held_files, hold_files, is_readable, names_file, pipes, read_file, stand_in};
-pub(crate) use note::{note, note_counted, unheard, warn};
+#[cfg(feature = "cli")]
+pub(crate) use note::unheard;
+pub(crate) use note::{note, note_counted, warn};
 pub use note::{tell_notes, tell_warnings};
 pub use table::{Row, TableReader};
 

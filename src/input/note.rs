@@ -47,6 +47,7 @@ pub fn tell_warnings() {
 }
 
 /// Does something without its notes and warnings.
+#[cfg(feature = "cli")]
 pub(crate) fn unheard<T>(work: impl FnOnce() -> T) -> T {
     let mut kept = None;
     listening(|listener| kept = listener.take());
