@@ -35,7 +35,7 @@ impl<B: Body> Bodies<B> {
 /// The items of a scene, to be picked by rays.
 ///
 /// Solid boxes are met as [`Solids`](crate::visibility::Solids) defines, triangles as
-/// [`Facets::solid`] does.
+/// [`Facets::solid`](crate::visibility::truth::Facets::solid) does.
 pub trait Pick: Send + Sync {
     /// The first item that the ray meets; of several at the same depth the one
     /// with the lowest id.
