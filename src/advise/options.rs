@@ -8,9 +8,7 @@ use crate::index::{Execution, StructureSpec};
 use crate::measure::{Setting, Workload};
 use crate::motion::Motion;
 
-/// Largest acceptable error: relative to the depth of the view, or in radians.
-///
-/// The former of planes, the latter of a camera basis.
+/// Largest acceptable error: of planes in depths of the view, of a camera's axes.
 pub(super) const TOLERANCE: f64 = 1e-5;
 /// Reason for which rules about nodes do not apply.
 pub(super) const NO_NODES: &str = "the structure taken has no nodes";

@@ -48,7 +48,7 @@ pub struct Facts<'f> {
 pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
     pub compared: Option<[f64; 2]>,
-    /// Assumption or error that decides, in at most 30 characters.
+    /// Assumption or error that decides, in a few words.
     ///
     /// Or why the rule does not apply.
     pub reason: String,

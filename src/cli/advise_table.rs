@@ -132,7 +132,7 @@ fn evidence(advice: &Advice) -> Vec<Block> {
     let tests = format!("Culling tests on {on}, with {ns} ns to draw an item that cannot be seen:");
     let columns: &[Column<&TestRow>] = &[
         ("test", |r| r.test.to_owned()),
-        (">query [95 % interval]", |r| some(r.query_ns, time_within)),
+        (">query", |r| some(r.query_ns, time_within)),
         (">false positives %", |r| text::rate(r.excess, 100.0)),
         (">missed ppm", |r| text::rate(r.false_negative_ppm, 1.0)),
         (">false positives per query", |r| {
@@ -194,7 +194,7 @@ fn features<'o>() -> [Column<&'o Omission>; 12] {
             };
             some(rule.check.as_ref(), |check| answers(check).to_owned())
         }),
-        ("statistic", |rule| rule.rule.statistic_name.to_owned()),
+        ("what it counts", |rule| rule.rule.statistic_name.to_owned()),
     ]
 }
 

@@ -61,7 +61,7 @@ pub enum Command {
     Funnel(FunnelArgs),
     /// Recommend a structure, a test and work to skip for a scene, with the evidence
     Advise(AdviseArgs),
-    /// Measure errors of camera updates (turn, orbit, chase) after up to ten million
+    /// Measure errors of camera updates (turns, spring arms) after up to ten million
     /// steps
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, and check their declared outcomes
@@ -336,7 +336,7 @@ pub struct DriftArgs {
     /// Number of steps of the camera bases
     #[arg(long, value_name = "N", default_value = "1e6", value_parser = drift::steps)]
     pub steps: u64,
-    /// Show every table: what methods do, times of arms, limits of stability
+    /// Show every table: what methods do, limits of stability
     #[arg(long)]
     pub all: bool,
     /// Also write the figures and all tables as one page

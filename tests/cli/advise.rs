@@ -410,7 +410,7 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
     // What is assumed stands in its line.
     let culling = told.lines().find(|line| line.contains("occlusion culling"));
     assert!(
-        culling.is_some_and(|line| line.contains("1000 ns/item")),
+        culling.is_some_and(|line| line.contains("1,000 ns/item")),
         "{told}"
     );
     let all = works(Path::new("."), &format!("{line} --all-columns"));

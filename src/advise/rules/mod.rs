@@ -37,6 +37,6 @@ pub(super) const RULES: &[Rule] = rows! {
         Statistic, |_| structures::rebuild();
     "f64-kernel", "double precision", "margin for rounding to f32 / depth of the view",
         Statistic, planes::f64_kernel;
-    "frame-correction", "basis correction", "drift after all steps of the path, radians",
+    "frame-correction", "basis correction", "error of the axes after all steps of the path",
         Statistic, structures::frame_correction;
 };

@@ -90,7 +90,7 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
     let pays = (testing / (cost_ns * without)).max(0.0);
     let reason = format!(
         "{} ns/{one}{}",
-        (cost_ns * 1e1).round() / 1e1,
+        significant(cost_ns),
         pays_from.unwrap_or_default()
     );
     let on = format!("{} {}, as in funnel", gain.stage.name(), gain.back_end);
@@ -127,10 +127,10 @@ mod tests {
         assert_eq!(dear.decision, Decision::Keep);
         assert_eq!(dear.statistic, Some(0.8));
         assert!((dear.threshold.unwrap() - 200.0 / 255.0).abs() < 1e-12);
-        assert_eq!(dear.reason, "5.1 ns/thing, pays from 5.00");
+        assert_eq!(dear.reason, "5.10 ns/thing, pays from 5.00");
         // A cost that is not 0 is not shown as 0.
         let little = settled([0.0, 1e6], 1.1, 1.0);
-        assert_eq!(little.reason, "1 ns/thing, pays from 0.0000100");
+        assert_eq!(little.reason, "1.00 ns/thing, pays from 0.0000100");
         let cheap = settled([10.0, 50.0], 3.0, 4.9);
         assert_eq!(cheap.decision, Decision::LeaveOut);
         // It costs 300 + 49 with and 100 + 245 without.

@@ -24,26 +24,33 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let all = items.len() as f64;
     Ok(Draft::concluded(sides, move |facts| {
         let taken = facts.structure;
+        // Follows the structure taken, wherever there was a choice.
+        let [tree, fastest] = taken.tree_and_scan();
+        let both = tree.zip(fastest);
+        let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
+        let ratio = both.and_then(|(tree, scan)| over(tree, scan));
+        let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
+        let alone = facts.check.as_ref().filter(|_| costs.is_none());
         let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
-        let crossing = match below.filter(|turn| turn.structure == scan) {
-            _ if taken.is_scan() => all,
+        let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
+        let scan_wins = alone.map_or(taken.is_scan(), wins);
+        let below = below.filter(|turn| turn.structure == scan && alone.is_none());
+        let crossing = match below {
+            _ if scan_wins => all,
             Some(turn) => turn.at,
             None => 0.0,
         };
         let least = change.map_or(all, |change| change.measured[0]);
-        // Follows the structure taken, wherever there was a choice.
-        let [tree, scan] = taken.tree_and_scan();
-        let both = tree.zip(scan);
-        let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
-        let ratio = both.and_then(|(tree, scan)| over(tree, scan));
-        let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
         let reason = match crossing {
-            _ if costs.is_none() => "no part was measured with both".to_owned(),
+            _ if costs.is_none() => format!("by all items alone{place}"),
             // A scan that ties with a tree wins nowhere.
             _ if taken.is_scan() && is_tie == Some(true) => "a scan and a tree tie".to_owned(),
             0.0 => format!("no scan wins from {} items on", count(least as usize)),
-            _ => format!("a scan wins up to {}", counted(crossing as usize, "item")),
+            _ => format!(
+                "a scan wins up to {}",
+                counted(crossing.round() as usize, "item")
+            ),
         };
         Finding {
             cost_ns: costs,
@@ -98,6 +105,14 @@ pub(super) fn rebuild() -> anyhow::Result<Draft> {
             let mut ranked = motion.policies.iter().filter(|cell| cell.rank.is_some());
             ranked.find(|cell| policy_of(&cell.structure) == policy)
         };
+        let is_rebuild = |(policy, _): &&(String, f64)| policy == "rebuild";
+        let ruled_out = motion.ruled_out.iter().find(is_rebuild);
+        if let Some((&(_, builds), refitted)) = ruled_out.zip(cell("refit").and_then(ns)) {
+            return Finding {
+                cost_ns: Some([builds, refitted]),
+                ..Finding::new(refitted, builds, "its builds alone")
+            };
+        }
         let both = cell("rebuild").zip(cell("refit"));
         let costs = both.and_then(|(kept, left_out)| Some([ns(kept)?, ns(left_out)?]));
         let Some(((rebuilt, refitted), [kept, left_out])) = both.zip(costs) else {
@@ -112,28 +127,20 @@ pub(super) fn rebuild() -> anyhow::Result<Draft> {
     }))
 }
 
-/// Drift of an f32 frame per step, radians: docs/NUMERICS.md.
-const DRIFT: f64 = 5e-8;
-
 /// Correcting a camera's frame, by a polar Newton step every 100 steps.
 ///
-/// Axes in f32 that are turned and never straightened drift by some 5e-8 a step. A frame
-/// that is built for each camera, or takes few steps, does not need it. Checked by walking.
+/// Axes in f32 that are turned and never straightened drift by some 5e-8 a step: a walk of
+/// as many steps says how far. A frame that is built for each camera does not need it.
 pub(super) fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
     let path = trials.case.path;
     let steps = path.cameras.len() + path.left_out;
     let [(error, without), (_, with)] =
         ["f32", "f32-polar-100"].map(|method| walk(method, steps as u64));
     let [kept, left_out] = [with, without].map(|ask| trials.enter(false, ask));
-    let drift = match error {
-        Some(error) => format!("drift of {error:.1e} rad"),
-        None => "the basis is lost".to_owned(),
-    };
-    let reason = format!("{}: {drift}", counted(steps, "step"));
-    let finding = Finding {
-        leaves_out: Some(error.is_some_and(|error| error <= TOLERANCE)),
-        ..Finding::new(steps as f64 * DRIFT, TOLERANCE, reason)
-    };
+    // That of a basis that is lost is infinite.
+    let error = error.unwrap_or(f64::INFINITY);
+    let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
+    let finding = Finding::new(error, TOLERANCE, reason);
     let sides = Sides::new("500 steps of a frame", kept, left_out);
     Ok(Draft::new(sides, finding))
 }
