@@ -81,8 +81,10 @@ impl Margin {
             let eye = zero.iter().sum::<DVec3>() + frame.eye;
             derived += f64::EPSILON * eye.abs().element_sum();
         }
-        // The planes of a matrix are rounded sums about the exact zero.
-        let of_named = lens.matrix().map_or(derived, |_| 0.0);
+        // The planes of a matrix are rounded sums about the exact zero. Components of their
+        // normals that are subnormal in f32 are no less rounded than others.
+        let underflow = reach.element_sum() * TINY;
+        let of_named = lens.matrix().map_or(derived, |_| underflow);
         Margin {
             c,
             reach,

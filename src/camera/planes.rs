@@ -5,7 +5,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::margin::{Margin, TINY};
+use super::margin::Margin;
 use super::projection::{double, single};
 use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result, require};
 use crate::geometry::{
@@ -177,8 +177,7 @@ impl Camera {
         };
         let margin = self.margin(&about, of_scene, epsilon, PlaneMethod::Frame)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
-        let slack = of_eye + margin.reach.element_sum() * TINY;
-        let planes = margin.volume(&named, &more, reach + zero.abs(), slack)?;
+        let planes = margin.volume(&named, &more, reach + zero.abs(), of_eye)?;
         Ok(RelativeVolume::new(eye, planes)?)
     }
 }

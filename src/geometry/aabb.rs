@@ -159,6 +159,25 @@ impl Aabb {
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
+    /// The box about the same zero, `scale` times as large.
+    pub fn scaled(&self, scale: f32) -> Aabb {
+        Aabb::new(self.min * scale, self.max * scale)
+    }
+
+    /// Power of two that scales a scene with these bounds so that areas fit f32.
+    ///
+    /// 1 for coordinates between 2^-40 and 2^40; beyond, areas that are compared would
+    /// overflow or vanish, and the scene is brought to about unit size.
+    pub fn scale_for_areas(&self) -> f32 {
+        let largest = self.reach().max_element();
+        let exponent = libm::ilogbf(largest);
+        if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
+            return 1.0;
+        }
+        // Clamped to normal numbers; a subnormal scene is brought to 2^-23.
+        libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
+    }
+
     /// Largest absolute coordinate on each axis: how far from the local
     /// origin anything in the box can be; zero for an empty box.
     pub fn reach(&self) -> Vec3 {

@@ -57,8 +57,6 @@ mod wide;
 pub use build::bsp::{Bsp, BspParams, PlaneSource};
 #[cfg(feature = "cli")]
 pub(crate) use build::bsp_split_planes::by_surface_area;
-#[cfg(feature = "peers")]
-pub(crate) use build::bvh::scale_for;
 pub use build::bvh::{Bvh, BvhParams, BvhPreset};
 pub use build::cells::{CellParams, Octree, Quadtree};
 pub(crate) use build::ploc;

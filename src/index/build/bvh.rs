@@ -125,7 +125,7 @@ impl Stacks {
     /// The boxes that obvhs builds over, one per stack: the items themselves where
     /// they can be used as they are, so that ten million of them are not copied.
     fn boxes<'a>(&self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
-        let scale = scale_for(items);
+        let scale = Aabb::union_of(items).scale_for_areas();
         if scale == 1.0 && self.starts.is_empty() && self.members.len() == items.len() {
             return Cow::Borrowed(items);
         }
@@ -133,26 +133,9 @@ impl Stacks {
             0 => self.members.len(),
             ends => ends - 1,
         };
-        let scaled = |stack: u32| {
-            let b = items[self.get(stack)[0] as usize];
-            Aabb::new(b.min * scale, b.max * scale)
-        };
+        let scaled = |stack| items[self.get(stack)[0] as usize].scaled(scale);
         (0..stacks as u32).map(scaled).collect()
     }
-}
-
-/// Power of two that scales the scene to about unit size.
-///
-/// 1 for coordinates between 2^-40 and 2^40. Beyond, the areas that the builder
-/// compares would overflow or vanish in f32.
-pub fn scale_for(items: &[Aabb]) -> f32 {
-    let largest = Aabb::union_of(items).reach().max_element();
-    let exponent = libm::ilogbf(largest);
-    if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
-        return 1.0;
-    }
-    // Clamped to normal numbers; a subnormal scene is brought to 2^-23.
-    libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
 /// Copies the topology of obvhs's tree into a packed tree. O(n).

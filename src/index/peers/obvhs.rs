@@ -14,7 +14,7 @@ use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
 use crate::index::items::{Positions, Record};
 use crate::index::tree::node::Stack;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc, scale_for};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{Context, ItemId};
 
 /// Parameters: `peer-obvhs:update=move`.
@@ -90,9 +90,8 @@ impl BoxTested for PeerObvhs {
             return Ok(PeerObvhs::default());
         }
         let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let scale = scale_for(&boxes);
-        let scaled = |b: &Aabb| Aabb::new(b.min * scale, b.max * scale);
-        let small: Vec<Aabb> = boxes.iter().map(scaled).collect();
+        let scale = Aabb::union_of(&boxes).scale_for_areas();
+        let small: Vec<Aabb> = boxes.iter().map(|b| b.scaled(scale)).collect();
         let mut bvh = ploc::build(&small, BvhBuildParams::medium_build());
         bvh.reorder_in_stack_traversal_order();
         if scale != 1.0 {

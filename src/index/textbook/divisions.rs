@@ -264,8 +264,7 @@ impl Division for ObvhsNodes {
         // At unit size: the builder compares areas, which must not overflow.
         let reach = Aabb::union_of(input.items).reach().max_element();
         let scale = reach.recip().min(f32::MAX);
-        let scaled = |b: &Aabb| Aabb::new(b.min * scale, b.max * scale);
-        let boxes = stacks.iter().map(|stack| scaled(&stack[0].bounds));
+        let boxes = stacks.iter().map(|stack| stack[0].bounds.scaled(scale));
         let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf.min(255),
             ..BvhBuildParams::medium_build()

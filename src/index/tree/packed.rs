@@ -290,6 +290,29 @@ mod tests {
         }
     }
 
+    #[test]
+    fn nodes_are_grouped_alike_at_any_scale() {
+        let lanes = |scale: f32| {
+            let place = |i: u32| Vec3::new((i * i) as f32, (i % 7) as f32, 0.5);
+            let items = (0..300).map(|i| Aabb::around(place(i), Vec3::ONE).scaled(scale));
+            let items: Vec<Aabb> = items.collect();
+            let tree = PackedTree::grow(items.len(), 0..items.len(), |tree, _, group, groups| {
+                let middle = group.start.midpoint(group.end);
+                match group.len() {
+                    1 => tree.push(group.start as ItemId, &items[group.start]),
+                    _ => groups.extend([group.start..middle, middle..group.end]),
+                }
+            });
+            let links = tree.wide_nodes.links.iter();
+            links.map(|links| links.first).collect::<Vec<_>>()
+        };
+        let usual = lanes(1.0);
+        assert!(usual.len() > 16);
+        for power in [66, -100] {
+            assert_eq!(lanes(libm::ldexpf(1.0, power)), usual, "2^{power}");
+        }
+    }
+
     fn assert_fitted(tree: &PackedTree, items: &[Aabb]) {
         for node in &tree.nodes {
             let own = tree.ids[node.items()].iter().map(|&id| &items[id as usize]);

@@ -49,13 +49,14 @@ impl WideNodes {
         if nodes.is_empty() || is_leaf(nodes, 0) {
             return wide;
         }
+        let scale = nodes[0].bounds.scale_for_areas();
         // Breadth first, so that wide nodes of one level are adjacent.
         let mut waiting = VecDeque::from([0]);
         let mut queued = 1;
         while let Some(parent) = waiting.pop_front() {
             let mut links = Links::default();
             let mut block = BoxBlock::EMPTY;
-            for (lane, node) in lanes_of(nodes, parent).enumerate() {
+            for (lane, node) in lanes_of(nodes, parent, scale).enumerate() {
                 block.set(lane, &nodes[node].bounds);
                 links.first[lane] = nodes[node].first;
                 links.end[lane] = nodes[node].items().end as u32;
@@ -109,8 +110,9 @@ impl WideNodes {
 }
 
 /// At most sixteen descendants that a node's block holds, in tree order.
-fn lanes_of(nodes: &[TreeNode], parent: usize) -> impl Iterator<Item = usize> {
-    let below = |node| children(nodes, node).map(|child| (nodes[child].bounds.half_area(), child));
+fn lanes_of(nodes: &[TreeNode], parent: usize, scale: f32) -> impl Iterator<Item = usize> {
+    let area = |node: usize| nodes[node].bounds.scaled(scale).half_area();
+    let below = |node| children(nodes, node).map(|child| (area(child), child));
     let mut lanes: Vec<(f32, usize)> = below(parent).collect();
     loop {
         let fits = |node| {

@@ -248,6 +248,38 @@ fn points_on_the_planes_of_matrices_are_not_lost() {
     println!("points on planes of matrices: {visible} visible, {lost_bare} lost without a margin");
 }
 
+/// A window 0.002 wide whose left plane leans by a component that is subnormal in f32.
+///
+/// Over 5e37 units along y, its rounding moves the plane by a third of what the box is inside.
+#[test]
+fn a_subnormal_component_of_a_normal_loses_nothing() {
+    let (along, lean) = (5e37, f64::exp2(-151.0));
+    let entries = [
+        [1e3, 1e3 * lean, 0.0, 0.0],
+        [0.0, 1.0 / 6e37, 0.0, 0.0],
+        [0.0, 0.0, -0.1, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let camera = Camera::of_matrix(entries, MatrixConvention::ColumnGl).expect("a camera");
+    let high = (-0.001 - 0.8 * lean * along) as f32;
+    let seen = Aabb::new(
+        Vec3::new(high - 1e-4, along as f32, -1.0),
+        Vec3::new(high, along as f32, 1.0),
+    );
+    let around = Surroundings::of_boxes(&[seen]);
+    let oracle = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO);
+    assert!(oracle.expect("a camera").verdict(&seen) != Verdict::Out);
+    for made in safe_views_of(&camera, DVec3::ZERO, &[seen]) {
+        let kept = match made {
+            CameraView::Spheres(_) => made.as_any().sees(&sphere_cube(&seen)),
+            _ => made.as_any().sees(&seen),
+        };
+        assert!(kept, "{made:?}");
+    }
+    let volume = camera.volume(&PlaneOptions::default(), &around);
+    assert!(volume.expect("planes").sees(&seen));
+}
+
 /// |x| <= -z, |y| <= -z, 1 <= -z <= 3 (or without an end).
 const OPEN_GL: Entries = [
     [1.0, 0.0, 0.0, 0.0],
