@@ -116,8 +116,12 @@ pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
         Category::Syntax | Category::Io => {
             return (format!("no JSON ({})", said.replace('`', "'")), None);
         }
-        Category::Data => {}
+        Category::Data => in_words(said),
     }
+}
+
+/// The same from the words with which serde refuses a value.
+pub fn in_words(said: &str) -> (String, Option<String>) {
     let mut cuts = [", expected ", ", there are "].into_iter();
     match cuts.find_map(|between| said.rsplit_once(between)) {
         Some((there, wanted)) => (found(there), Some(expected(wanted))),

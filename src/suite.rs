@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use crate::input::{InputError, read_file};
+use crate::json::in_words;
 use crate::measure::{Effort, PlannedScene};
 use crate::path::DEFAULT_PATH;
 use crate::scene::every_part;
@@ -94,7 +95,13 @@ fn written(file: &str, default: Option<&str>) -> Result<Suite, InputError> {
     let written: Written = toml::from_str(text).map_err(|error| {
         let begin = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
-        let found = error.message().replace('\n', ", ").replace('`', "'");
+        let said = error.message().replace('\n', ", ").replace('`', "'");
+        let found = match in_words(&said) {
+            (found, Some(wanted)) if said.starts_with("invalid ") => {
+                format!("{found}; expected {wanted}")
+            }
+            _ => said,
+        };
         let expected = "; expected a suite: [[scenes]], each with a scene and its paths";
         let expected = [expected, ""][usize::from(found.contains("expected"))];
         InputError::new(format_args!("{file}, line {line}: {found}{expected}"))

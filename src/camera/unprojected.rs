@@ -87,10 +87,11 @@ impl ViewProjection {
         })
     }
 
-    /// Returns whether the image is not sheared and depth runs along the axis of view.
-    pub fn is_straight(&self) -> bool {
-        let found = self.unprojected();
-        found.is_ok_and(|found| found.shear <= STRAIGHT && found.tilt <= STRAIGHT)
+    /// Returns whether the image is sheared or depth does not run along the axis of view;
+    /// `None` without a lens.
+    pub fn is_sheared(&self) -> Option<bool> {
+        let found = self.unprojected().ok()?;
+        Some(found.shear > STRAIGHT || found.tilt > STRAIGHT)
     }
 
     /// Returns whether it has no lens: axes of unit length, and w is 1 everywhere.

@@ -78,12 +78,10 @@ fn break_even(surface: &Surface) -> Option<Table> {
     let structures = surface.no_scans();
     let told = |place: &Place, structure: &str| {
         let cell = place.cell(structure);
-        match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
+        match cell.map(|c| c.value("break_even_queries")) {
             None => String::new(),
-            Some((Some(queries), _)) => text::count(queries as usize),
-            // Built no more dearly than the scan's own copy of the items.
-            Some((None, Some(ratio))) if ratio > 1.0 => "0".to_owned(),
-            Some(_) => "never".to_owned(),
+            Some(Some(queries)) => text::count(queries as usize),
+            Some(None) => "never".to_owned(),
         }
     };
     let mut table = Table::of_numbers(["items, visible"].iter().chain(&structures).copied());
@@ -105,7 +103,7 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
     for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
         blocks.push(Block::heading(format!("Crossover: {}", title(surface))));
         blocks.push(Block::line(
-            "The fastest structure (= if differences are not significant) and its speed-up vs \
+            "The fastest structure (= those not told from it) and its speed-up vs \
              linear; none if a scan wins. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, \
              7, 10, ... percent; (at ...) gives a share that is more than a tenth off. ~ N is \
              interpolated between two sizes, on log scales.",
@@ -113,7 +111,8 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
         blocks.push(Block::Table(winners(surface)));
         blocks.extend(crossings(surface).map(Block::Table));
         if let Some(rows) = break_even(surface) {
-            let line = "Queries after which the build pays off against the linear scan:";
+            let line = "Queries after which the build pays off against the linear scan (never: not \
+                        faster, or not shown to be):";
             blocks.extend([Block::line(line), Block::Table(rows)]);
         }
         let figures = growth(surface).into_iter();

@@ -237,12 +237,12 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
 
 /// How the views differ from the truth about points on their own faces: few
 /// scenes have boxes so near. The scene bounds what the epsilon is for, so
-/// points beyond it are left out; without a far plane all are.
+/// points beyond it are left out.
 fn on_the_faces(workload: &Workload) -> ErrorCount {
     let around = workload.scene.surroundings();
     let mut errors = ErrorCount::default();
     for (camera, view) in workload.cameras.iter().zip(&workload.views) {
-        let (Some(_), Ok(volume)) = (camera.lens.far(), camera.convex_volume_f64(&around)) else {
+        let Ok(volume) = camera.convex_volume_f64(&around) else {
             continue;
         };
         let mut points = points_on_faces(camera, around.origin, volume.planes());

@@ -93,7 +93,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "update_ms_10_percent", "ms", Of::Process(|s| s.update_ms.get(2).copied()), "as update_ms, after 10 % have moved";
     "update_ms_100_percent", "ms", Of::Process(|s| s.update_ms.get(3).copied()), "as update_ms, after all have moved";
     "memory_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_bytes), "nodes, item bounds and ids / items";
-    "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never";
+    "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never, or not shown to be faster";
     "growth_exponent", "1", Of::Report, "slope of ln query_ns over ln items: 0 does not grow, 1 as a scan does; least squares over three or more sizes of a world with about as many visible items on the same kind of path; absent below three";
     "locate_ns", "ns", Of::Time(TaskKind::Locate), "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
     "locate_batched_ns", "ns", Of::Time(TaskKind::LocateBatched), "thread CPU time of a region search of all points of the path in one batch, per point; as query_ns";

@@ -353,7 +353,8 @@ impl<'p> MergedParts<'p> {
         Some(all.iter().map(|ns| ns / mean * shown).collect())
     }
 
-    /// Queries after which the build is repaid against the yardstick; `None` if never.
+    /// Queries after which the build is repaid against the yardstick; `None` if never,
+    /// or if it is not shown to be faster.
     fn break_even(&self, label: &str) -> Option<f64> {
         let cost = |label: &str| -> Option<[f64; 2]> {
             let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;
@@ -363,7 +364,9 @@ impl<'p> MergedParts<'p> {
         let [build, query] = cost(label).filter(|_| is_paid)?;
         let [linear_build, linear_query] = cost(YARDSTICK)?;
         let (price, gain) = (build - linear_build, linear_query - query);
-        (gain > 0.0).then(|| (price.max(0.0) / gain).ceil())
+        let [yardstick, own] = self.paired(label, TaskKind::Query)?;
+        let is_faster = speedup(yardstick, own)?.exceeds(1.0) && gain > 0.0;
+        is_faster.then(|| (price.max(0.0) / gain).ceil())
     }
 
     /// Time of `label` / time of `other`, equal to the ratio of the two shown values.

@@ -293,12 +293,13 @@ fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
 /// Matrices that are no camera's, and those whose transposes are.
 fn unstraight(_: &Scene, cameras: &[Camera]) -> Option<String> {
     let matrices = cameras.iter().filter_map(|c| c.lens.matrix());
-    let matrices = matrices.filter(|matrix| !matrix.is_straight());
+    let matrices = matrices.filter(|matrix| matrix.is_sheared() == Some(true));
     let matrices: Vec<&ViewProjection> = matrices.collect();
     let first = matrices.first()?;
     let what = share(matrices.len(), cameras);
     let transposed = matrices.iter().filter_map(|matrix| matrix.transposed());
-    if transposed.filter(ViewProjection::is_straight).count() == matrices.len() {
+    let is_straight = |matrix: &ViewProjection| matrix.is_sheared() == Some(false);
+    if transposed.filter(is_straight).count() == matrices.len() {
         let convention = first.convention();
         return Some(format!(
             "{what} read as {} sheared, their transposes are not; --matrix-convention {} if they \

@@ -2,9 +2,11 @@
 //! and the share of them that is visible, and from which size on a structure is
 //! faster than the linear scan. Read off a report; nothing is measured.
 
+use std::mem::replace;
+
 use super::ranking::{grouped, unique};
 use super::{Comparison, Report, ReportCell};
-use crate::measure::{Metric, Status, YARDSTICK};
+use crate::measure::{Metric, Status};
 use crate::statistics::{Estimate, slope, sorted};
 
 /// One world of several sizes, with one cache state and culling test.
@@ -164,8 +166,8 @@ impl Surface<'_> {
     }
 
     /// Number of items from which a structure is faster than the linear scan for good;
-    /// `None` if it is known at one size only. It is faster where it ranks before linear;
-    /// in between, the logarithms of the speed-ups are interpolated.
+    /// `None` if it is known at one size only. It is faster where that is shown
+    /// ([`Estimate::exceeds`]); in between, the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
         let curve = self.curve(structure, class, "speedup");
         let is_faster = |point: &(usize, f64)| self.is_faster(structure, class, point.0);
@@ -182,7 +184,7 @@ impl Surface<'_> {
         }
         let [(n0, r0), (n1, r1)] = [curve[slower], curve[slower + 1]];
         let along = -r0.ln() / (r1.ln() - r0.ln());
-        // Faster by its time already, but not by its rank.
+        // Faster by its time already, but not shown to be.
         if !(0.0..=1.0).contains(&along) {
             return Some(Crossing::Below(n1));
         }
@@ -190,13 +192,15 @@ impl Surface<'_> {
         Some(Crossing::At((n0 + along * (n1 - n0)).exp()))
     }
 
-    /// Returns true if it ranks before linear in every path of size and class.
+    /// Returns true if it is shown to be faster in every path of size and class.
     fn is_faster(&self, structure: &str, class: f64, items: usize) -> bool {
         let here = |place: &&Place| place.class == class && place.items == items;
         let mut places = self.places.iter().filter(here);
         places.all(|place| {
-            let [own, linear] = [structure, YARDSTICK].map(|name| place.cell(name)?.rank);
-            own.zip(linear).is_none_or(|(own, linear)| own < linear)
+            let ratio = place
+                .cell(structure)
+                .and_then(|cell| cell.metrics.get("speedup"));
+            ratio.is_none_or(|ratio| ratio.estimate().exceeds(1.0))
         })
     }
 }
@@ -256,13 +260,15 @@ fn key(cell: &ReportCell) -> SeriesKey<'_> {
 }
 
 fn of_series<'r>((key, mut points): (SeriesKey<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
-    points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    // By items, the fewest visible first: they are the first of their size.
+    points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut found = Vec::new();
-    while let Some(&(_, least, ..)) = points.first() {
-        let end = points.partition_point(|p| p.1 <= least * SAME_COUNT);
-        let mut same: Vec<Point> = points.drain(..end).collect();
-        same.sort_by_key(|p| p.0);
-        same.dedup_by_key(|p| p.0);
+    while let Some(least) = points.iter().map(|p| p.1).min_by(f64::total_cmp) {
+        let mut last = 0;
+        // Cells beyond one a size are of another path, and of a later series.
+        let is_same = |p: &Point| p.1 <= least * SAME_COUNT && p.0 != replace(&mut last, p.0);
+        let (same, others): (Vec<Point>, Vec<Point>) = points.into_iter().partition(is_same);
+        points = others;
         let log = |&(items, _, ns, _): &Point| ((items as f64).ln(), ns.ln());
         let logs: Vec<(f64, f64)> = same.iter().map(log).collect();
         let Some(exponent) = slope(&logs).filter(|_| same.len() >= LEAST_SIZES) else {
@@ -370,9 +376,9 @@ mod tests {
     fn a_tie_is_no_crossing() {
         let tied = |items: usize, ns: f64| {
             let mut tied = comparison(items, 0.02, &[("bvh", ns), ("linear", 1000.0)]);
-            let mut linear = tied.cells[1].clone();
-            linear.rank = Some(1);
-            tied.cells[1] = Box::leak(Box::new(linear));
+            let mut bvh = tied.cells[0].clone();
+            bvh.metrics.get_mut("speedup").expect("a ratio").lower = Some(0.99);
+            tied.cells[0] = Box::leak(Box::new(bvh));
             tied
         };
         let crossing = |places: Vec<Comparison<'static>>| {
@@ -383,7 +389,7 @@ mod tests {
         // Faster by the clock at 1,000 items, but not told apart.
         let found = crossing(vec![tied(1_000, 950.0), clear()]);
         assert_eq!(found, Some(Crossing::Below(10_000)));
-        // Not before linear in another path of that size.
+        // Not in another path of that size.
         let found = crossing(vec![clear(), tied(10_000, 900.0), tied(1_000, 950.0)]);
         assert_eq!(found, Some(Crossing::Above(10_000)));
         let found = crossing(vec![tied(1_000, 950.0), tied(10_000, 900.0)]);
@@ -444,5 +450,12 @@ mod tests {
         // Two paths of one size are not two sizes.
         let twice = [points[0], points[0], points[1], points[1]];
         assert!(grown(&twice).is_empty());
+        // Two paths whose counts are within 30 % of each other keep their own sizes.
+        let own = [(1, 85.0), (2, 88.0), (4, 90.0)].map(|(n, seen)| (n, seen, 9.0, n));
+        let other = [(1, 112.0), (2, 113.0), (4, 107.0)].map(|(n, seen)| (n, seen, 9.0, 10 * n));
+        let cells = grown(&[own, other].concat())
+            .into_iter()
+            .map(|growth| growth.cells);
+        assert_eq!(cells.collect::<Vec<_>>(), [[1, 2, 4], [10, 20, 40]]);
     }
 }

@@ -41,6 +41,11 @@ impl Estimate {
         Some([self.lower?, self.upper?])
     }
 
+    /// Tests whether it is shown to be above a bound: by its lower end, if it has one.
+    pub fn exceeds(self, bound: f64) -> bool {
+        self.lower.unwrap_or(self.value) > bound
+    }
+
     /// Value and interval divided by a number of units.
     pub fn per(self, units: f64) -> Estimate {
         Estimate {

@@ -270,7 +270,8 @@ pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
 /// Points on the faces of a camera's view, as near as f32 has them: what a
 /// rounding that is not the usual one, or a missing epsilon, puts on the other
 /// side. For each face points all over the view (the R3 sequence of Roberts
-/// 2018), moved onto it; faces and points are about `origin`.
+/// 2018), moved onto it, along the line of sight where it ends there; faces and
+/// points are about `origin`.
 pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Vec<Aabb> {
     const EACH: u32 = 48;
     const STEP: DVec3 = DVec3::new(
@@ -278,15 +279,34 @@ pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Ve
         0.671_043_606_703_789_3,
         0.549_700_477_901_970_3,
     );
-    let (frame, near) = (&camera.frame, camera.lens.near());
-    let far = camera.lens.far().unwrap_or(near * 1000.0);
+    let Camera { frame, lens } = camera.unprojected().unwrap_or(*camera);
+    let (eye, near) = (frame.eye - origin, lens.near());
+    let far = lens.far().unwrap_or(near.abs() * 1000.0);
+    let [left, right, bottom, top] = match lens.matrix() {
+        // Sheared or oblique: no window of its own.
+        Some(_) => [-1.0, 1.0, -0.5, 0.5],
+        None => lens.window(),
+    };
     let mut points = Vec::new();
     for face in faces {
         for i in 0..EACH {
             let share = (STEP * f64::from(i)).fract();
-            let depth = near + (far - near) * share.z;
-            let (x, y) = ((share.x * 2.0 - 1.0) * depth, (share.y - 0.5) * depth);
-            let at = frame.eye - origin + frame.u() * x + frame.v() * y - frame.n() * depth;
+            let (x, y) = (
+                left + (right - left) * share.x,
+                bottom + (top - bottom) * share.y,
+            );
+            let aside = frame.u() * x + frame.v() * y;
+            let [from, along] = match lens.is_orthographic() {
+                true => [eye + aside, -frame.n()],
+                false => [eye, aside - frame.n()],
+            };
+            let end = -(face.normal.dot(from) + face.d) / face.normal.dot(along);
+            let is_end = |of: f64| (end - of).abs() <= of.abs() * 1e-9;
+            let depth = match is_end(near) || is_end(far) {
+                true => end,
+                false => near + (far - near) * share.z,
+            };
+            let at = from + along * depth;
             let on = (at - face.normal * (face.normal.dot(at) + face.d)).as_vec3();
             points.push(Aabb::new(on, on));
         }
@@ -331,16 +351,18 @@ pub fn variants(
         // The same planes again, each a little farther out.
         Plane::new(p.normal, p.d + (i / 12) as f32 * 0.01 * far as f32)
     });
-    let away = Plane::new(-planes[0].normal, -planes[0].d - 0.01 * far as f32);
+    // A matrix may have any number of planes.
+    let first = planes.first().copied().unwrap_or(Plane::new(Vec3::X, 0.0));
+    let away = Plane::new(-first.normal, -first.d - 0.01 * far as f32);
     let mut volumes = vec![
         Some(straight.clone()),
         with(camera.lens.with_far(None).unwrap_or(camera.lens)).ok(),
         ortho.and_then(with).ok(),
         Lens::off_axis(window, near, Some(far)).and_then(with).ok(),
     ];
-    let few = planes[..1 + seed % 5].to_vec();
+    let few = planes.iter().copied().take(1 + seed % 5).collect();
     let (twelve, many) = (twelve.clone().collect(), many.collect());
-    for planes in [sheared, few, twelve, many, vec![planes[0], away]] {
+    for planes in [sheared, few, twelve, many, vec![first, away]] {
         volumes.push(ConvexVolume::from_planes(&planes).ok());
     }
     let kinds = VOLUME_KINDS.into_iter().zip(volumes);

@@ -90,7 +90,14 @@ fn a_file_that_is_no_suite_is_refused_with_its_line() {
             "[[scenes]]\npath = [3]",
             "bad.toml, line 2: | 'path' | 'paths'",
         ),
-        ("[[scenes]]\nscene = 3", "bad.toml, line 2: | 3 | a string"),
+        (
+            "[[scenes]]\nscene = 3",
+            "bad.toml, line 2: '3'; expected a text",
+        ),
+        (
+            "processes = 2.5\n[[scenes]]\nscene = 'city'",
+            "bad.toml, line 1: '2.5'; expected a whole number from 0 to",
+        ),
         (
             "processes = 0\n[[scenes]]\nscene = 'city'",
             "processes is 0; expected",
