@@ -100,9 +100,9 @@ pub fn time(ns: f64) -> String {
 /// The unit that fits a time, in ns, and its name.
 pub fn unit(ns: f64) -> (f64, &'static str) {
     match ns {
-        n if n < 1e3 => (1.0, "ns"),
-        n if n < 1e6 => (1e3, "us"),
-        n if n < 1e9 => (1e6, "ms"),
+        n if n < 999.5 => (1.0, "ns"),
+        n if n < 999.5e3 => (1e3, "us"),
+        n if n < 999.5e6 => (1e6, "ms"),
         _ => (1e9, "s"),
     }
 }
@@ -120,8 +120,11 @@ pub fn significant(value: f64) -> String {
         let sign = if value < 0.0 { "-" } else { "" };
         return sign.to_owned() + &count(value.abs().round() as usize);
     }
-    let digits = 2 - value.abs().log10().floor() as i32;
-    format!("{value:.*}", digits.clamp(0, 12) as usize)
+    // Of the rounded number: 9.996 is 10.0.
+    let rounded = format!("{:.2e}", value.abs());
+    let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse().ok());
+    let digits = (2 - exponent.unwrap_or(0)).clamp(0, 12) as usize;
+    format!("{value:.digits$}")
 }
 
 /// The first and the last characters of a longer text, with the mark of a cut.
@@ -236,6 +239,16 @@ mod tests {
             assert_eq!(plain(&plain(text)), wanted);
         }
         assert_eq!(lines("a\n\u{1b}b\r\n"), "a\n\\u{1b}b \n");
+    }
+
+    #[test]
+    fn three_digits_are_those_of_the_rounded_number() {
+        let shown = [9.994, 9.996, -99.96, 0.9996, 999.6].map(significant);
+        assert_eq!(shown, ["9.99", "10.0", "-100", "1.00", "1,000"]);
+        assert_eq!(
+            [999.7, 999_600.0, 999.4].map(time),
+            ["1.00 us", "1.00 ms", "999 ns"]
+        );
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub fn near_unit(v: ExactVector) -> Option<ExactVector> {
     Some(v.map(|component| component.scaled(-exponent)))
 }
 
-/// Pi, true to 2^-330.
+/// Pi, true to 2^-329.
 ///
 /// The first four terms are those of Hida, Li and Bailey 2001, "Algorithms for quad-double
 /// precision floating point arithmetic".

@@ -53,9 +53,9 @@ impl Lens {
     /// Without `far` what is visible has no end.
     ///
     /// # Errors
-    /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or, as far,
-    /// beyond 1e100, near >= far, a value that is not finite. A far plane beyond
-    /// [`FARTHEST`] is an infinite one.
+    /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or beyond
+    /// 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] is an
+    /// infinite one.
     pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
@@ -63,7 +63,8 @@ impl Lens {
     /// A lens of parallel rays by its height in world units and width / height.
     ///
     /// # Errors
-    /// Height or aspect outside 1e-100 to 1e100, near >= far, a value that is not finite.
+    /// Height or aspect outside 1e-100 to 1e100, near beyond 1e100, far beyond
+    /// [`FARTHEST`], near >= far, a value that is not finite.
     pub fn orthographic(height: f64, aspect: f64, near: f64, far: f64) -> Result<Lens> {
         Lens::new(LensKind::Orthographic { height, aspect }, near, Some(far))
     }

@@ -121,7 +121,8 @@ impl ViewProjection {
         let is_bounded = ahead.iter().all(|&sign| sign > 0);
         for (name, plane) in matrix.planes_about(&[matrix.eye]) {
             match name {
-                FrustumPlane::Near => matrix.near = plane.d.abs(),
+                // Without an eye the zero is a point of that very plane.
+                FrustumPlane::Near if !matrix.is_parallel => matrix.near = plane.d.abs(),
                 FrustumPlane::Far if is_bounded => matrix.far = Some(plane.d.abs()),
                 _ => {}
             }

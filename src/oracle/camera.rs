@@ -1,8 +1,8 @@
 //! The planes of a camera to 250 bits.
 //!
 //! Pose and lens count as exact real numbers; roots, sines and cosines are carried far
-//! beyond what any tie could need. Of the code under test only the exact direction of view
-//! is shared.
+//! beyond what any tie could need. Exact sums and products are shared
+//! with the cameras under test; tests judge both by rationals.
 
 use glam::DVec3;
 
@@ -37,7 +37,8 @@ impl Oracle {
     /// Every verdict is that about the real volume, or a touch marked as
     /// undecided, where the two cannot be distinguished: pose and lens count as
     /// exact, lengths from 1e-60 to 1e60 and angles from 1e-12 degrees are
-    /// carried without loss. A matrix is the volume alone, and its planes are
+    /// carried without loss; a window narrower than 2^-150 of its depth has no width
+    /// where it looks along an axis. A matrix is the volume alone, and its planes are
     /// carried without any error. Some ten times the cost of
     /// [`Oracle::of_volume`].
     ///

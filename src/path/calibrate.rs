@@ -65,11 +65,8 @@ pub(super) fn for_visible_share(
     };
     let unreached = |found: &str, wanted: &str| {
         let scene = &scene.name;
-        let reason = format!(
-            "visible={}% cannot be reached: six planes return {found} of '{scene}' along \
-             it; expected a {wanted} share",
-            significant(share * 100.0)
-        );
+        let reason =
+            format!("six planes return {found} of '{scene}' along it; expected a {wanted} share");
         unfit(path, reason)
     };
     let (mut low, mut high) = (1e-4, 4.0);

@@ -353,12 +353,13 @@ fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     };
     let is_blind = !scene.items.is_empty() && !sample.is_empty() && !sample.iter().any(sees_any);
     is_blind.then(|| {
-        let views = match (sample.len(), counted(cameras.len(), "view")) {
-            (some, all) if some < cameras.len() => format!("{some} of {all}"),
-            (_, all) => all,
+        let views = match (sample.len(), cameras.len()) {
+            (_, 1) => "its view".to_owned(),
+            (some, all) if some < all => format!("any of {some} of {all} views"),
+            (_, all) => format!("any of {all} views"),
         };
         // Items may come into view once they move.
         let name = &scene.name;
-        format!("nothing of {name} as loaded is visible in any of {views}")
+        format!("nothing of {name} as loaded is visible in {views}")
     })
 }

@@ -420,7 +420,7 @@ impl Optics {
 /// be both and is neither.
 fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecError> {
     let value = spec.number("visible", 0.0)?;
-    if value > 0.0 && value < 1.0 {
+    if value > 0.0 && value < 1.0 && items > 0 {
         return Ok(value);
     }
     // 200 % are a share that is none, not two items. All of them cannot be
@@ -429,7 +429,8 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
         return Ok(value / items as f64);
     }
     let count = match items {
-        0..=2 => format!("; no count is possible of {}", counted(items, "item")),
+        0 => " of at least one item".to_owned(),
+        1..=2 => format!("; no count is possible of {}", counted(items, "item")),
         3 => " or a count of 2".to_owned(),
         _ => format!(" or a count from 2 to {}", items - 1),
     };

@@ -92,8 +92,8 @@ const FAR_IN_NEARS: f64 = 1000.0;
 
 /// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
-/// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
-/// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
+/// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg`
+/// empty; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
 /// (row, column) and nothing of the others. Times in `time_s` must ascend; an empty one is
 /// not known. Columns in any order; a note names those that are not read, but for labels
 /// such as `name`.

@@ -178,7 +178,7 @@ fn a_share_below_all_that_can_be_reached_is_refused() {
             "0% or 25.0%, and no share between, of 'b'",
         ),
         (100, "outside:frames=4,visible=20%", ""),
-        (0, "orbit:frames=8,visible=2%", "at most 0% of 'b'"),
+        (0, "orbit:frames=8,visible=2%", "(2%) of at least one item"),
         (1, "orbit:visible=1", "(2%); no count is possible of 1 item"),
         (
             2,

@@ -46,7 +46,9 @@ fn views_are_right<T: RegionIndex>(
     most: usize,
 ) -> Outcome {
     let (items, cubes) = (&asked.items, cubes(asked));
-    for volume in asked.volumes.iter().step_by(step).take(most) {
+    // The first three are kinds of their own.
+    let (odd, rest) = asked.volumes.split_at(asked.volumes.len().min(3));
+    for volume in odd.iter().chain(rest.iter().step_by(step)).take(most) {
         let wide = ConvexVolumeF64::from_planes(&finer(volume));
         let wide = wide.map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
