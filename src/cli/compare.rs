@@ -257,7 +257,9 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
     let old = read_report(&file)?.run;
     let newest = newest_run(Path::new("results"), |path| {
         let run = read_report(&path.join("report.json")).ok()?.run;
-        Some(run).filter(|run| run.id != old.id && run.started_at >= old.started_at)
+        // A baseline may be named `report`.
+        let is_run = path != Path::new(BASELINES);
+        Some(run).filter(|run| is_run && run.id != old.id && run.started_at >= old.started_at)
     });
     let newest = newest.context(
         "no run in results since the baseline; expected one to compare with it, or its folder",

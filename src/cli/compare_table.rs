@@ -270,7 +270,9 @@ impl CompareTable<'_> {
             return table;
         };
         let mut first_to_go = vec!["metric", "resolves", processes, "old", "new"];
-        let is_of_metric = |row: &&JudgedRow| row.metric == rows[0].metric;
+        // Rows without a verdict on times have none.
+        let metric = rows.iter().find_map(|row| row.metric);
+        let is_of_metric = |row: &&JudgedRow| row.metric.is_none() || row.metric == metric;
         first_to_go.retain(|name| *name != "metric" || rows.iter().all(is_of_metric));
         let table = table.within(room, &first_to_go);
         // One value alone says nothing.

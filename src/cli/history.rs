@@ -10,7 +10,9 @@ use super::run_verdict::is_fat;
 use super::table::{Column, Table};
 use super::{program, text};
 use crate::measure::Metric;
-use crate::report::{Report, ReportCell, asked_otherwise, grouped, settings, timed_otherwise};
+use crate::report::{
+    Report, ReportCell, RunInfo, asked_otherwise, grouped, settings, timed_otherwise,
+};
 
 /// Digits of a commit that name it.
 const COMMIT: usize = 7;
@@ -25,12 +27,15 @@ fn name(report: &Report) -> String {
     name.chars().take(digits).collect::<String>() + dirty
 }
 
-/// Names of the runs, with their start where two would be the same.
+/// Names of the runs, with their start and the digits of their ids where two would be
+/// the same.
 fn names(reports: &[Report]) -> Vec<String> {
     let started = |run: &usize| {
-        let start = reports[*run].run.started_at.chars().skip(5).take(14);
+        let RunInfo { started_at, id, .. } = &reports[*run].run;
+        let start = started_at.chars().skip(5).take(14);
         let start = start.collect::<String>().replace('T', " ");
-        format!("{} {start}", name(&reports[*run]))
+        let digits = id.rsplit('-').next().unwrap_or_default();
+        format!("{} {start} {digits}", name(&reports[*run]))
     };
     let runs = Vec::from_iter(0..reports.len());
     distinct(&runs, |run| name(&reports[*run]), started)

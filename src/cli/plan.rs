@@ -95,7 +95,11 @@ impl Plan<'_> {
         all.sort_by(|(a, ..), (b, ..)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let far = all.len().saturating_sub(MOST_DRAWN);
         all.truncate(MOST_DRAWN);
-        let notes = [(apart, "on other storeys"), (far, "farther from the eye")].into_iter();
+        let farther = match self.camera {
+            Some(_) => "farther from the eye",
+            None => "farther from the middle",
+        };
+        let notes = [(apart, "on other storeys"), (far, farther)].into_iter();
         let notes = notes.filter(|(count, _)| *count > 0);
         let notes =
             notes.map(|(count, why)| format!("not drawn: {} {why}", text::counted(count, "item")));

@@ -17,7 +17,9 @@ use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, create, go_on, resume};
 use super::study::progress;
-use super::{Ending, compare, expect_folder, interrupt, run_why, tell, text, unread_is_fine};
+use super::{
+    Ending, compare, expect_folder, interrupt, program, run_why, tell, text, unread_is_fine,
+};
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
@@ -153,7 +155,11 @@ impl<'a> Run<'a> {
         shown?;
         unread_is_fine(self.close(&report, save))?;
         if stopped {
-            tell("interrupted: finished cells were saved; continue with --resume");
+            let (name, folder) = (program::name(), self.folder.path().display().to_string());
+            let again = format!("{name} run --resume --out {}", text::quoted(&folder));
+            tell(&format!(
+                "interrupted: finished cells were saved; continue with {again}"
+            ));
             return Ok(Ending::Interrupted);
         }
         Ok(Ending::of(!report.has_failed()))

@@ -143,7 +143,9 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
             is_scan: true,
             points: visible.iter().enumerate().map(point).collect(),
         };
-        let y = Axis::linear("", 0.0..most as f64, &count);
+        let mut y = Axis::linear("", 0.0..most as f64, &count);
+        y.ticks = y.all_ticks();
+        y.ticks.retain(|tick| tick.fract() == 0.0);
         let short = "; single views are too short to be timed each";
         let why = if figures.is_empty() { short } else { "" };
         let caption = format!("{about}: visible items {course}{why}");

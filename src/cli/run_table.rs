@@ -237,14 +237,15 @@ pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Tab
 pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Block> {
     let about = || all.iter().map(|comparison| comparison.about());
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
-    let up: Vec<&str> = up.into_iter().collect();
+    // Unknown of a scene that did not load.
+    let up: Vec<&str> = up.into_iter().filter(|up| !up.is_empty()).collect();
     let lens = scene_facts::lenses(about().map(|cell| &cell.path));
     let [cache, test, _] = all.first().map(|one| key(one)).unwrap_or_default();
     let cache = if cache == "warm" { "" } else { ", cold" };
     let lens = lens.map(|lens| format!("{test}{cache}; {} up; {lens}", up.join(" or ")));
-    let names = labels(all).into_iter();
-    let names = names.map(|label| without_middle(&text::plain(&label), [width / 4; 2]));
-    let mut parts = matrix(names.collect(), all, overall).parts(width);
+    let cut = |label: &String| without_middle(&text::plain(label), [width / 4; 2]);
+    let names = distinct(&labels(all), cut, |label| text::plain(label));
+    let mut parts = matrix(names, all, overall).parts(width);
     let hidden = parts.split_off(1);
     let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
     let more = text::counted(hidden, "further structure");

@@ -219,7 +219,8 @@ fn were(count: usize) -> String {
 
 /// Conclusion of several scenes and paths.
 pub fn of_many(all: &[&Comparison], overall: &Overall) -> String {
-    let mut told = vec![standing(all.len(), overall)];
+    let ranked = all.iter().filter(|c| c.winners().next().is_some());
+    let mut told = vec![standing(ranked.count(), overall)];
     let base = overall.base.filter(|_| overall.standings.len() > 1);
     told.extend(base.and_then(fallback));
     told.extend(checked(all));

@@ -3,7 +3,7 @@
 //! Their two ratios multiply to the ratio of the times.
 
 use super::document::Block;
-use super::run_table::{groups, labels, settings};
+use super::run_table::{distinct, groups, labels, settings};
 use super::run_verdict::times;
 use super::table::Table;
 use super::text::{self, some};
@@ -51,7 +51,7 @@ pub fn blocks(report: &Report, structure: &str) -> Vec<Block> {
 
 /// Returns true for a structure by its label, or by its name without parameters.
 pub fn is_named(label: &str, name: &str) -> bool {
-    label == name || label.split(':').next() == Some(name)
+    label == name || label.split([':', '@']).next() == Some(name)
 }
 
 /// The structure with that label, or without parameters that name.
@@ -69,7 +69,9 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
     let is_other = |cell: &&ReportCell| {
         cell.structure != own.structure && !is_named(&cell.structure, structure)
     };
+    let is_variant = |cell: &&ReportCell| cell.structure != own.structure;
     let other = comparison.sound().find(is_other);
+    let other = other.or_else(|| comparison.sound().find(is_variant));
     let other = other.ok_or_else(|| "No other structure has a time.".to_owned())?;
     let speedup = comparison.speedup(&other.structure, own);
     let ends = speedup.and_then(Estimate::ends);
@@ -190,7 +192,8 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
         "| best other | >frame | >update | >time | >tests | >time per test | >nodes | >items",
     );
     let (mut frames, mut ratios) = (Vec::new(), <[Vec<f64>; 3]>::default());
-    for (label, pair) in labels.iter().zip(pairs) {
+    let short = distinct(labels, |label| shortened(label, 28), String::clone);
+    for (label, pair) in short.into_iter().zip(pairs) {
         let Ok(pair) = pair else { continue };
         let own = [query_ns, tests, ns_per_test].map(|of| pair.ratio(of));
         for (all, own) in ratios.iter_mut().zip(own) {
@@ -202,7 +205,7 @@ fn of_many(labels: &[String], pairs: &[Result<Pair, String>], structure: &str) -
         frames.extend(frame[0]);
         let figures = frame.into_iter().chain(own).chain(counters);
         let figures = figures.map(|ratio| some(ratio, times));
-        let names = [shortened(label, 28), shortened(&pair.other.structure, 24)];
+        let names = [label, shortened(&pair.other.structure, 24)];
         table.add_row(names.into_iter().chain(figures));
     }
     let margins = pairs.iter().flatten().map(|pair| pair.margin);

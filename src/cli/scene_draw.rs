@@ -2,7 +2,7 @@
 //!
 //! With a camera, both in the colours of a query's verdicts.
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use glam::Vec3;
 
 use super::command_args::SceneDrawArgs;
@@ -75,11 +75,15 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
                 bail!("--frame is {frame}; expected {cameras}");
             };
             caption.push(format!("camera {frame} of {}", path.name));
-            Some(*camera)
+            Some((*camera, path.place(frame)))
         }
     };
-    let view = |camera| Culling::default().view(camera, &scene.surroundings());
-    let view = camera.as_ref().map(view).transpose()?;
+    let around = scene.surroundings();
+    let view = camera.as_ref().map(|(camera, place)| {
+        let view = Culling::default().view(camera, &around);
+        view.with_context(|| place.clone())
+    });
+    let view = view.transpose()?;
     let index = structure.as_ref().map(|spec| {
         caption.push(format!("{}, levels 0 to {}", spec.label, args.depth));
         spec.build(input_of(&scene, &scene.items))
@@ -106,7 +110,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let plan = Plan {
         caption: caption.join("; "),
         scene: &scene,
-        camera: camera.as_ref(),
+        camera: camera.as_ref().map(|(camera, _)| camera),
         classes: match (&view, &index) {
             (None, _) => ITEMS,
             (_, None) => SEEN,

@@ -102,12 +102,19 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
     let is_shown = |surface: &&Surface| surface.spans() && surface.sizes().len() >= sizes;
     for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
         blocks.push(Block::heading(format!("Crossover: {}", title(surface))));
-        blocks.push(Block::line(
-            "The fastest structure (= those not told from it) and its speed-up vs \
-             linear; none if a scan wins. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, \
-             7, 10, ... percent; (at ...) gives a share that is more than a tenth off. ~ N is \
-             interpolated between two sizes, on log scales.",
-        ));
+        let speedups = match surface
+            .places
+            .iter()
+            .any(|place| place.cell(YARDSTICK).is_some())
+        {
+            true => " and its speed-up vs linear; none if a scan wins",
+            false => "",
+        };
+        blocks.push(Block::Line(format!(
+            "The fastest structure (= those not told from it){speedups}. Shares are rounded on \
+             a log scale to 1, 1.5, 2, 3, 5, 7, 10, ... percent; (at ...) gives a share that is \
+             more than a tenth off. ~ N is interpolated between two sizes, on log scales."
+        )));
         blocks.push(Block::Table(winners(surface)));
         blocks.extend(crossings(surface).map(Block::Table));
         if let Some(rows) = break_even(surface) {
@@ -248,7 +255,8 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         let about = comparison.about();
         let base = Overall::of(&[comparison]).base;
         if let Some(mut figure) = base.and_then(|base| run_figures::speedups(comparison, base)) {
-            let [scene, path] = [&about.scene.name, &about.path.name];
+            let scene = &about.scene.name;
+            let path = &text::joined([&about.path.name, &about.path.motion]);
             let of = run_figures::of(comparison);
             figure.caption = format!("{of}, {}: {}", about.test, figure.caption);
             add([scene, path, &about.path.cache, &about.test], figure);

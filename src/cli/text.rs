@@ -309,13 +309,13 @@ pub fn html(text: &str) -> String {
     text.replace('\'', "&#39;")
 }
 
-/// A share as a percentage, never rounded up to 100.
+/// A share as a percentage, rounded neither up to 100 nor down to 0.
 pub fn percent(share: f64) -> String {
-    let rounded = format!("{:.2}", share * 100.0);
-    if rounded == "100.00" && share < 1.0 {
-        return ">99.99 %".to_owned();
+    match format!("{:.2}", share * 100.0).as_str() {
+        "100.00" if share < 1.0 => ">99.99 %".to_owned(),
+        "0.00" if share > 0.0 => "<0.01 %".to_owned(),
+        rounded => format!("{rounded} %"),
     }
-    format!("{rounded} %")
 }
 
 /// A share in percent with up to three digits, never rounded up to 100: "0.1 %".

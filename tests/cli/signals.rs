@@ -80,8 +80,11 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     // The first line is the header.
     wait_until("no first part", || lines() >= 2);
     let done = interrupt(child);
-    let told =
-        STOPPING.to_owned() + "interrupted: finished cells were saved; continue with --resume\n";
+    let again = "continue with cullbench run --resume --out r";
+    let told = format!(
+        "{STOPPING}interrupted: finished cells were saved; {again}
+"
+    );
     assert_eq!((done.code, &done.err), (Some(130), &told), "{line}");
     assert!(
         done.out.contains("1 of 2 processes: times without"),
