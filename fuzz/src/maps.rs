@@ -46,10 +46,10 @@ pub fn ibsp(bytes: &[u8]) {
     }
 }
 
-/// Finds what each place sees of the regions, by every search.
+/// Finds what each place sees of the regions.
 pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
     let graph = Arc::new(graph);
-    let rows = RegionRow::searches(&graph);
+    let row = RegionRow::search(&graph);
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
     let lens = Lens::perspective(60.0, 1.5, 1.0, None).expect("a lens");
     for place in places {
@@ -60,10 +60,8 @@ pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
         let Ok(rays) = Rays::of(&Camera { frame, lens }) else {
             continue;
         };
-        for row in &rows {
-            row.from_eye(&rays, &mut scratch, &mut found);
-            assert!(found.is_sorted() && found.iter().all(|&id| (id as usize) < graph.len()));
-        }
+        row.from_eye(&rays, &mut scratch, &mut found);
+        assert!(found.is_sorted() && found.iter().all(|&id| (id as usize) < graph.len()));
     }
 }
 

@@ -111,7 +111,7 @@ impl Chain {
         let object = structures.first().map_or(NONE, |spec| &spec.label);
         let chain = Chain::empty().with(StageKind::Object, object);
         let wanted = [
-            (StageKind::Region, PORTAL_CLIP),
+            (StageKind::Region, PORTAL_RECT),
             (StageKind::Occlusion, MASKED_INNER),
             (StageKind::Triangle, "per-triangle"),
             (StageKind::Fragment, default_test(has_cut_outs)),
@@ -164,7 +164,7 @@ impl Chain {
     }
 }
 
-const PORTAL_CLIP: &str = "portal-clip";
+const PORTAL_RECT: &str = "portal-rect";
 const MASKED_INNER: &str = "masked-inner";
 /// The test that takes every item for solid.
 pub const Z: &str = "z-test";

@@ -391,9 +391,10 @@ impl Regions {
             (None, scene::Regions::Leaves(map)) => RegionGraph::of_quake(map),
             (None, _) => RegionGraph::of_scene(scene).ok_or(None)?,
         });
-        let searches = RegionRow::searches(&graph).into_iter();
+        let search = Some(RegionRow::search(&graph));
+        let search = search.filter(|row| row.back_end.is_for(scene));
         let mut regions = Regions {
-            rows: searches.filter(|row| row.back_end.is_for(scene)).collect(),
+            rows: Vec::from_iter(search),
             items: RegionItems::of(&graph, scene),
             graph,
         };
@@ -469,7 +470,7 @@ mod tests {
         let mut found = 0;
         for view in world.views() {
             let (mut left, mut right, mut none) = (Vec::new(), Vec::new(), Vec::new());
-            run(StageKind::Region, "flood")(view, None, &mut left);
+            run(StageKind::Region, "portal-rect")(view, None, &mut left);
             run(StageKind::Object, "linear")(view, Some(&left), &mut right);
             run(StageKind::Object, "blind")(view, Some(&left), &mut none);
             let sees = |id: &ItemId| world.views[view].volume.sees(&scene.items[*id as usize]);

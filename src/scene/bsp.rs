@@ -222,13 +222,6 @@ fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
 /// The depth is linear in the point (Sutherland and Hodgman 1974).
 pub fn clipped<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64) -> Vec<P> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
-    clip_into(polygon, depth, &mut kept);
-    kept
-}
-
-/// The same part, in place of what was kept.
-pub fn clip_into<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64, kept: &mut Vec<P>) {
-    kept.clear();
     let mut last = polygon.last().map(|&last| (last, depth(last)));
     for &p in polygon {
         let b = depth(p);
@@ -241,6 +234,7 @@ pub fn clip_into<P: Point>(polygon: &[P], depth: impl Fn(P) -> f64, kept: &mut V
             kept.push(p);
         }
     }
+    kept
 }
 
 /// A point in the plane or in space.

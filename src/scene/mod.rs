@@ -44,7 +44,7 @@ pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
 #[cfg(feature = "cli")]
-pub(crate) use bsp::{clip_into, clipped};
+pub(crate) use bsp::clipped;
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
 pub(crate) use generate::COUNT;

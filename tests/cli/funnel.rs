@@ -132,7 +132,7 @@ fn tables_of_many_items_with_intervals_fit() {
     let lines = [
         format!("funnel --scene city:n=10000 {more} --all"),
         format!(
-            "funnel --scene rooms:n=2000,seed=12345678901234567890 {more} --region portal-clip \
+            "funnel --scene rooms:n=2000,seed=12345678901234567890 {more} --region portal-rect \
              --occlusion masked-inner"
         ),
     ];
@@ -382,7 +382,7 @@ fn what_cannot_be_is_refused_in_a_line() {
     let folder = folder();
     for (more, wanted) in [
         ("--occlusion maskd", "maskd | did you mean 'masked'"),
-        ("--region portal-clip", "portal-clip"),
+        ("--region portal-rect", "portal-rect"),
         ("--samples 0x4", "--samples | 0x4 | columns x rows"),
         ("--samples 320", "--samples | 320"),
         ("--structure nosuch", "nosuch"),

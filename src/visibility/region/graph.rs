@@ -152,12 +152,6 @@ impl Opening {
             _ => None,
         }
     }
-
-    /// The other of its two regions.
-    pub fn other(&self, region: RegionId) -> RegionId {
-        let [front, behind] = self.sides;
-        if region == front { behind } else { front }
-    }
 }
 
 /// The corners of a flat rectangle across an axis, in turn.

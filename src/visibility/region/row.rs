@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::graph::{RegionGraph, RegionId};
-use super::search::{Flood, PortalClip, PortalRect, Search};
+use super::search::Search;
 use crate::index::IdSet;
 use crate::input::{InputError, Result};
 use crate::json::from_json;
@@ -122,12 +122,8 @@ pub type BackEnd = Row<Source>;
 /// Source of the answers of a back end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
-    /// A search that takes each opening by itself.
-    Flood,
     /// A search with rectangles of the image.
     PortalRect,
-    /// A search with clipped openings.
-    PortalClip,
     /// Pairs of regions read from a file, or the table of a Quake III map.
     Claim,
     /// The REJECT table of a map.
@@ -136,12 +132,8 @@ pub enum Source {
 
 /// All back ends of the region stage.
 pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, build, guarantee, summary }
-    "flood", Source::Flood, Guarantee::Conservative,
-        "regions reached through openings that meet the view volume";
     "portal-rect", Source::PortalRect, Guarantee::Conservative,
         "rectangles of the image, intersected from opening to opening";
-    "portal-clip", Source::PortalClip, Guarantee::Conservative,
-        "openings clipped as convex polygons by those before them";
     "stored-pvs", Source::Claim, Guarantee::Unproven,
         "the row of the eye's region in a set of pairs, the map's own or read from a file";
     "reject", Source::Reject, Guarantee::Unproven,
@@ -176,16 +168,13 @@ pub struct RegionRow {
 pub struct Scratch {
     homes: Vec<RegionId>,
     seen: IdSet,
-    flood: Search<Flood, ()>,
-    portal_rect: Search<PortalRect, [f64; 4]>,
-    portal_clip: Search<PortalClip, [u32; 2]>,
+    search: Search,
 }
 
 impl RegionRow {
-    /// The back ends that search, in the order of the table.
-    pub fn searches(graph: &Arc<RegionGraph>) -> [RegionRow; 3] {
-        [Source::Flood, Source::PortalRect, Source::PortalClip]
-            .map(|source| RegionRow::of(source, graph.clone(), None))
+    /// The back end that searches.
+    pub fn search(graph: &Arc<RegionGraph>) -> RegionRow {
+        RegionRow::of(Source::PortalRect, graph.clone(), None)
     }
 
     /// A back end that reads stored pairs; `None` if they are of another number of
@@ -210,7 +199,11 @@ impl RegionRow {
     #[allow(clippy::wrong_self_convention)] // Regions seen from an eye, not a conversion.
     pub fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> bool {
         let graph = &*self.graph;
-        let Scratch { homes, seen, .. } = scratch;
+        let Scratch {
+            homes,
+            seen,
+            search,
+        } = scratch;
         out.clear();
         if !graph.homes(rays, homes) {
             out.extend(0..graph.len() as u32);
@@ -221,11 +214,9 @@ impl RegionRow {
             return true;
         }
         seen.clear(graph.len());
-        match (&self.pvs, self.back_end.build) {
-            (Some(pvs), _) => seen.insert_all(homes.iter().flat_map(|&home| pvs.row(home))),
-            (None, Source::Flood) => scratch.flood.run(graph, rays, homes, seen),
-            (None, Source::PortalRect) => scratch.portal_rect.run(graph, rays, homes, seen),
-            (None, _) => scratch.portal_clip.run(graph, rays, homes, seen),
+        match &self.pvs {
+            Some(pvs) => seen.insert_all(homes.iter().flat_map(|&home| pvs.row(home))),
+            None => search.run(graph, rays, homes, seen),
         }
         seen.list(out);
         true

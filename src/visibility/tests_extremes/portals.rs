@@ -9,7 +9,6 @@ use glam::DVec3;
 use super::case::looking;
 use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
-use crate::visibility::Guarantee;
 use crate::visibility::Rays;
 use crate::visibility::region::{
     Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, leads_through, rectangle,
@@ -21,13 +20,6 @@ pub struct Chain {
     openings: Vec<Opening>,
     ends: [DVec3; 2],
     rays: Rays,
-}
-
-/// Rooms that one back end lost in a chain.
-pub struct Answer {
-    pub row: &'static str,
-    /// Rooms on the line of sight that the back end does not list.
-    pub lost: Vec<u32>,
 }
 
 /// A chain of `length` rooms, near the origin or far from it.
@@ -70,11 +62,11 @@ pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
 }
 
 impl Chain {
-    /// Answers of the back ends with a guarantee.
+    /// Rooms on the line of sight that the search does not list, and the search's name.
     ///
-    /// Their openings are narrower than the real ones by `shrink` on each side. `None` if
+    /// Its openings are narrower than the real ones by `shrink` on each side. `None` if
     /// exact arithmetic does not confirm that the line of sight passes the openings.
-    pub fn answers(&self, shrink: f64) -> Option<Vec<Answer>> {
+    pub fn lost(&self, shrink: f64) -> Option<(&'static str, Vec<u32>)> {
         let graph = RegionGraph::of_boxes(self.rooms.clone(), self.openings.clone());
         let last = self.rooms.len() as u32 - 1;
         if !leads_through(&graph, [0, last], self.ends) {
@@ -85,23 +77,10 @@ impl Chain {
             .iter()
             .map(|opening| narrower(*opening, shrink));
         let narrow = RegionGraph::of_boxes(self.rooms.clone(), narrow.collect());
-        let rows = rows(&Arc::new(narrow));
-        let safe = rows
-            .iter()
-            .filter(|row| row.back_end.guarantee <= Guarantee::Conservative);
-        Some(safe.map(|row| self.answer(row)).collect())
-    }
-
-    fn answer(&self, row: &RegionRow) -> Answer {
-        let mut listed = Vec::new();
+        let (row, mut listed) = (RegionRow::search(&Arc::new(narrow)), Vec::new());
         row.from_eye(&self.rays, &mut Scratch::default(), &mut listed);
-        let rooms = 0..self.rooms.len() as u32;
-        Answer {
-            row: row.back_end.name,
-            lost: rooms
-                .filter(|room| listed.binary_search(room).is_err())
-                .collect(),
-        }
+        let is_lost = |room: &u32| listed.binary_search(room).is_err();
+        Some((row.back_end.name, (0..=last).filter(is_lost).collect()))
     }
 }
 
@@ -119,8 +98,4 @@ fn narrower(opening: Opening, by: f64) -> Opening {
         corners: rectangle(0, (low + aside).min(middle), (high - aside).max(middle)),
         ..opening
     }
-}
-
-fn rows(graph: &Arc<RegionGraph>) -> [RegionRow; 3] {
-    RegionRow::searches(graph)
 }

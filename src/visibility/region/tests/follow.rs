@@ -46,6 +46,14 @@ fn boxes_from(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) 
     }
 }
 
+impl Opening {
+    /// The other of its two regions.
+    pub(super) fn other(&self, region: RegionId) -> RegionId {
+        let [front, behind] = self.sides;
+        if region == front { behind } else { front }
+    }
+}
+
 /// Lower and upper corner of the box about an opening.
 fn bounds(opening: &Opening) -> [DVec3; 2] {
     let corners = opening.corners.into_iter();

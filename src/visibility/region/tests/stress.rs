@@ -7,7 +7,6 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::super::*;
-use super::from_eye::rows;
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
@@ -65,10 +64,10 @@ fn chain(rng: &mut SeededRng, base: DVec3, length: usize, shrink: f64, margins: 
     }
 }
 
-/// Number of times that a row loses the last room of an accepted line of sight.
+/// Number of times that the search loses the last room of an accepted line of sight.
 ///
 /// And the number of times that the line was accepted.
-fn lost(row: usize, shrink: f64) -> (usize, usize) {
+fn lost(shrink: f64) -> (usize, usize) {
     let (mut lost, mut accepted) = (0, 0);
     for round in 0..400u64 {
         let base = [DVec3::ZERO, DVec3::new(1e7, -3e6, 12_345.678)][round as usize % 2];
@@ -76,7 +75,7 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
         // The finest are some units in the last place.
         let last_place = f64::EPSILON * (1.0 + base.abs().max_element());
         let margins = [1e-3, 1e-7, 8.0 * last_place, 2.0 * last_place];
-        // The same numbers for the truth and for the input of the row.
+        // The same numbers for the truth and for the input of the search.
         let truth = chain(&mut SeededRng::new(round), base, length, 0.0, &margins);
         let told = chain(&mut SeededRng::new(round), base, length, shrink, &margins);
         let graph = RegionGraph::of_boxes(truth.rooms, truth.openings);
@@ -94,7 +93,7 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
         let lens = Lens::perspective(60.0, 1.3, 1e-4, Some(1e3)).unwrap();
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
-        rows(&told)[row].from_eye(&rays, &mut scratch, &mut out);
+        RegionRow::search(&told).from_eye(&rays, &mut scratch, &mut out);
         lost += usize::from(out.binary_search(&(length as u32 - 1)).is_err());
     }
     (lost, accepted)
@@ -102,19 +101,15 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
 
 #[test]
 fn lines_through_chains_of_slits_are_not_lost() {
-    for row in 0..3 {
-        let (lost, accepted) = lost(row, 0.0);
-        assert_eq!(lost, 0, "row {row}");
-        assert!(accepted > 100, "{accepted}");
-    }
+    let (lost, accepted) = lost(0.0);
+    assert_eq!(lost, 0);
+    assert!(accepted > 100, "{accepted}");
 }
 
 #[test]
 fn openings_that_are_told_too_small_are_noticed() {
-    for row in 1..3 {
-        let (lost, accepted) = lost(row, 1e-5);
-        assert!(lost * 20 > accepted, "row {row}: {lost} of {accepted}");
-    }
+    let (lost, accepted) = lost(1e-5);
+    assert!(lost * 20 > accepted, "{lost} of {accepted}");
 }
 
 #[test]
@@ -123,19 +118,17 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     let graph = Arc::new(RegionGraph::of_boxes(chain.rooms, chain.openings));
     let [eye, end] = chain.ends;
     let frame = Frame::looking_along(eye, end - eye, DVec3::new(0.3, 0.5, 0.7)).unwrap();
-    let answer = |row: &RegionRow, lens: Lens| {
+    let answer = |lens: Lens| {
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        let place = row.from_eye(&rays, &mut Scratch::default(), &mut out);
+        let place = RegionRow::search(&graph).from_eye(&rays, &mut Scratch::default(), &mut out);
         (place, out.len())
     };
-    for row in &rows(&graph) {
-        let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
-        assert_eq!(answer(row, level), (false, 40));
-        // The last opening that is not beyond the far plane leads one room on.
-        let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
-        let (place, count) = answer(row, near);
-        assert!(place);
-        assert!((10..=12).contains(&count), "{} {count}", row.back_end.name);
-    }
+    let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
+    assert_eq!(answer(level), (false, 40));
+    // The last opening that is not beyond the far plane leads one room on.
+    let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
+    let (place, count) = answer(near);
+    assert!(place);
+    assert!((10..=12).contains(&count), "{count}");
 }
