@@ -93,7 +93,7 @@ pub struct FunnelArgs {
     /// [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
-    /// Compare every back end of every stage, depth orders and picking too, as --format
+    /// Compare every back end of every stage, draw orders and picking too, as --format
     /// json, --csv and --html do
     #[arg(long)]
     pub all: bool,

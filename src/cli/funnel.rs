@@ -24,7 +24,7 @@ use super::{
     Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_if, write_text,
 };
 use crate::funnel::{
-    self, Chain, Fate, FunnelInput, FunnelReport, NONE, OrderRow, PickRow, StageKind, StageRow,
+    self, Chain, Fate, FunnelInput, FunnelReport, NONE, PickRow, StageKind, StageRow,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
@@ -81,8 +81,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     write_if(&args.svg, || draw(&report, &setting.scene))?;
     write_if(&args.html, || page(&report, &setting.scene))?;
     shown?;
-    let (stages, orders, picks) = (&report.stages, &report.orders, &report.picks);
-    Ok(Ending::of(keep_their_word(stages, orders, picks)))
+    Ok(Ending::of(keep_their_word(&report.stages, &report.picks)))
 }
 
 /// Amount of work.
@@ -98,7 +97,7 @@ fn work(input: &FunnelInput) -> String {
 /// Returns true if nothing visible is lost and nothing exact wrong.
 ///
 /// Behind an unproven stage of the chain, items that the lost ones hid are seen.
-fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) -> bool {
+fn keep_their_word(stages: &[StageRow], picks: &[PickRow]) -> bool {
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
@@ -110,10 +109,8 @@ fn keep_their_word(stages: &[StageRow], orders: &[OrderRow], picks: &[PickRow]) 
             && row.errors.false_positive_count > 0.0
             && first.is_none_or(|first| row.back_end.stage <= first)
     };
-    let mut orders = orders.iter().filter(|row| row.exceptions.is_empty());
     let mut picks = picks.iter();
     judged.all(|row| row.errors.false_negative_count == 0.0 && !keeps_too_much(row))
-        && orders.all(|row| row.guarantee != Exact || row.wrong_sample_count == 0.0)
         && picks.all(|row| row.guarantee != Exact || row.wrong_count == 0)
 }
 
@@ -197,7 +194,7 @@ pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<P
 /// `/` stands before a field of a field. The columns are the same for every report.
 const TABLES: &str = include_str!("assets/funnel_tables.txt");
 
-/// Writes all tables; numbers as they are, lists as their lengths.
+/// Writes all tables; numbers as they are.
 pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let tables = serde_json::to_value(report)?;
@@ -233,8 +230,6 @@ fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
         Some(Value::String(text)) => lines(text),
-        Some(Value::Array(list)) => list.len().to_string(),
-        Some(Value::Object(list)) => list.len().to_string(),
         Some(plain) => plain.to_string(),
     }
 }
@@ -352,7 +347,7 @@ mod tests {
         use Guarantee::{Conservative, Unproven};
         let region = |guarantee, lost| row(StageKind::Region, guarantee, lost);
         let occlusion = |guarantee, lost| row(StageKind::Occlusion, guarantee, lost);
-        let keeps = |rows: [StageRow; 2]| keep_their_word(&rows, &[], &[]);
+        let keeps = |rows: [StageRow; 2]| keep_their_word(&rows, &[]);
         assert!(keeps([region(Conservative, 0.0), occlusion(Unproven, 2.0)]));
         assert!(!keeps([
             region(Conservative, 0.0),
@@ -385,27 +380,9 @@ mod tests {
         let keeps_more = |guarantee| {
             let mut kept = row(StageKind::Triangle, guarantee, 0.0);
             kept.errors.false_positive_count = 0.5;
-            keep_their_word(&[kept], &[], &[])
+            keep_their_word(&[kept], &[])
         };
         assert!(keeps_more(Conservative) && !keeps_more(Exact) && !keeps_more(SampleExact));
-        let order = |guarantee, reasons: &[&'static str]| {
-            let order = OrderRow {
-                name: "an order",
-                summary: "",
-                fragment_count: 9.0,
-                shaded_count: 9.0,
-                covered_count: 9.0,
-                overdraw: None,
-                pair_count: 1.0,
-                wrong_pair_count: 1.0,
-                wrong_sample_count: 0.5,
-                guarantee,
-                exceptions: reasons.iter().map(|reason| (*reason, 1)).collect(),
-                time: None,
-            };
-            keep_their_word(&[], &[order], &[])
-        };
-        assert!(order(Unproven, &[]) && order(Exact, &["a reason"]) && !order(Exact, &[]));
         let pick = |guarantee, wrong_count| {
             let pick = PickRow {
                 question: serde_json::from_value("first item".into()).unwrap(),
@@ -417,7 +394,7 @@ mod tests {
                 time: None,
                 ns_per_ray: None,
             };
-            keep_their_word(&[], &[], &[pick])
+            keep_their_word(&[], &[pick])
         };
         assert!(pick(Unproven, 1) && pick(Exact, 0) && !pick(Exact, 1));
     }

@@ -234,13 +234,10 @@ fn fragments(report: &FunnelReport) -> Table {
 
 fn orders(report: &FunnelReport) -> Table {
     let columns: &[Column<&OrderRow>] = &[
-        ("order", |row| row.name.to_owned()),
+        ("order", |row| row.order.name().to_owned()),
         (">fragments", |row| count(row.fragment_count)),
         (">shaded", |row| count(row.shaded_count)),
         (">overdraw", |row| some(row.overdraw, text::significant)),
-        (">pairs", |row| count(row.pair_count)),
-        (">wrong", |row| count(row.wrong_pair_count)),
-        (">wrong samples", |row| count(row.wrong_sample_count)),
         (">time", |row| text::time_plus_minus(row.time)),
     ];
     Table::with(&report.orders, columns)

@@ -15,9 +15,9 @@ use super::world::{Shape, World};
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
+use crate::visibility::Rays;
 use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests};
 use crate::visibility::truth::{Facet, SolidBox};
-use crate::visibility::{Rays, Solids};
 
 /// Samples and fragments of a test, means per view.
 pub type FragmentCounts = Tally<f64>;
@@ -98,7 +98,8 @@ impl<'w> FragmentStage<'w> {
         let left = match &world.shape {
             Shape::Boxes(solids) => {
                 let of = |view| {
-                    let bodies: Vec<_> = bodies(solids, &stages.listed(view)).collect();
+                    let listed = stages.listed(view);
+                    let bodies: Vec<_> = SolidBox::some(&solids.boxes, &listed).collect();
                     let room = Room::of(world, world.rays(view), &bodies);
                     Boxes { bodies, room }
                 };
@@ -252,12 +253,4 @@ impl Room {
             beyond,
         })
     }
-}
-
-/// Some of the items as bodies.
-fn bodies<'a>(solids: &'a Solids, items: &'a [ItemId]) -> impl Iterator<Item = SolidBox> + 'a {
-    items.iter().map(|&item| SolidBox {
-        b: solids.boxes[item as usize],
-        item,
-    })
 }

@@ -50,7 +50,7 @@ pub struct FunnelReport {
     pub solid_blocks: Option<BlocksRow>,
     /// Occluding boxes below the ground of a mesh; null for a scene without ground.
     pub ground: Option<GroundRow>,
-    /// Every depth order of the remaining items.
+    /// Every draw order of the remaining items.
     pub orders: Vec<OrderRow>,
     /// Items under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,
@@ -251,7 +251,7 @@ fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
 
 /// Remaining items and the worth of each stage in a paragraph, then sentences.
 ///
-/// The sentences are on back ends that lost items, the stencil and orders.
+/// The sentences are on back ends that lost items, and the stencil.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
     let last = report.stages.iter().find(is_last).map(|last| {
@@ -268,7 +268,6 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
     sentences.extend(of_stencil(report));
-    sentences.extend(report.orders.iter().flat_map(of_order));
     sentences
 }
 
@@ -333,14 +332,6 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
         },
         other.back_end.name,
     ))
-}
-
-/// Exceptions of an order that is declared exact.
-fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
-    row.exceptions.iter().map(|(reason, views)| {
-        let views = counted(*views, "view");
-        format!("Order {} may be wrong in {views}: {reason}.", row.name)
-    })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::error::{LeftOutRow, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage};
 use super::item_stages::{ItemStages, PlanView};
-use super::orders::{OrderRow, Orders, SORTED};
+use super::orders::{OrderRow, Orders};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
 use super::stage::{Chain, NONE, StageKind, default_test, left_out_of};
@@ -62,7 +62,7 @@ impl<'w> Study<'w> {
         let is_ordered = input.all || input.sorted;
         let is_ordered = is_ordered && fragments.too_much.is_none();
         Ok(Study {
-            orders: is_ordered.then(|| Orders::new(&items, input.all)),
+            orders: is_ordered.then(|| Orders::new(&items)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
             chain,
             items,
@@ -136,12 +136,13 @@ impl<'w> Study<'w> {
 
     /// The remaining items drawn from front to back, and as listed.
     fn gain_of_sorting(&self, orders: &[OrderRow]) -> Option<Gain> {
-        let [listed, sorted] = SORTED.map(|name| orders.iter().find(|row| row.name == name));
-        let (listed, sorted) = (listed?, sorted?);
+        let [listed, sorted] = orders else {
+            return None;
+        };
         let timed = self.items.timed(self.chain);
-        let with = [&timed[..], &[FunnelKey::Order(sorted.name.to_owned())]].concat();
+        let with = [&timed[..], &[FunnelKey::Order(sorted.order)]].concat();
         let counts = [sorted.shaded_count, listed.shaded_count];
-        let named = (sorted.name, "fragments");
+        let named = (sorted.order.name(), "fragments");
         Some(Gain::new(StageKind::Fragment, named, counts, [with, timed]))
     }
 
@@ -197,10 +198,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     let mut orders = Vec::new();
     if let Some(all) = &study.orders {
         begin("every order, drawn");
-        orders = all.drawn().unwrap_or_else(|reason| {
-            left_out.push(LeftOutRow::new(["orders", "all"], reason));
-            Vec::new()
-        });
+        orders = all.drawn();
     }
     let mut picks = Vec::new();
     if let Some(all) = &study.picks {
@@ -276,7 +274,7 @@ impl Prepared {
             row.set(times.ns(row.key()));
         }
         for row in &mut report.orders {
-            row.time = times.ns(FunnelKey::Order(row.name.to_owned()));
+            row.time = times.ns(FunnelKey::Order(row.order));
         }
         report.gains.iter_mut().for_each(|gain| gain.set(&times));
         report.conclusions = conclusions(&report);

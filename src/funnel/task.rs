@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::stage::{Chain, NONE, StageKind, Step};
 use super::world::FunnelInput;
 use crate::measure::{Ask, OverProcesses, ProcessTimes, StudyPlan, TimedTask};
+use crate::visibility::fragment::DrawOrder;
 
 named! {
     /// A question about a cursor.
@@ -33,8 +34,8 @@ pub enum FunnelKey {
     Steps(Vec<Step>),
     /// A back end of the triangle or fragment stage, behind the chain's item stages.
     Stage(StageKind, String),
-    /// A depth order.
-    Order(String),
+    /// A draw order.
+    Order(DrawOrder),
     /// A back end of picking.
     Pick(PickQuestion, String),
 }

@@ -59,7 +59,7 @@ pub struct FunnelInput<'a> {
     pub loading: LoadOptions,
     /// Instruction set of every stage, and threads that compute the truth.
     pub execution: Execution,
-    /// Every back end of every stage and depth orders beside the chain.
+    /// Every back end of every stage and draw orders beside the chain.
     pub all: bool,
     /// Picking, if `all`.
     pub picks: bool,

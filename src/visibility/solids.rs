@@ -42,20 +42,6 @@ impl Solids {
     pub fn hides_nothing(&mut self, item: ItemId) {
         self.inner[item as usize] = Aabb::EMPTY;
     }
-
-    /// Some of the items, numbered in this order.
-    ///
-    /// # Panics
-    /// If there is no such item.
-    pub fn some(&self, items: &[ItemId]) -> Solids {
-        let of = |boxes: &[Aabb]| items.iter().map(|&id| boxes[id as usize]).collect();
-        Solids {
-            origin: self.origin,
-            boxes: items.iter().map(|&id| self.boxes[id as usize]).collect(),
-            outer: of(&self.outer),
-            inner: of(&self.inner),
-        }
-    }
 }
 
 /// The largest f32 box about an origin that lies within the f64 one; empty if

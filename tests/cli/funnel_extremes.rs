@@ -70,28 +70,6 @@ fn areas_that_overflow_and_windows_too_narrow_for_f32_lose_nothing() {
     );
 }
 
-/// Forty overlapping boxes, cut into hundreds of parts that each fill the image.
-#[test]
-fn an_order_that_cuts_much_is_drawn_as_the_others_are() {
-    let of = |i: i32| format!("{0},-50,-50,{1},50,50\n", f64::from(i) * 1e-3, 100 + i);
-    let scene: String = (0..40).map(of).collect();
-    let camera = "-20,1,2,1,0,0,0,0,1,60,1.5,0.1,1000";
-    let report = report(
-        &scene,
-        "fovy_deg,aspect,near,far",
-        camera,
-        "--samples 300x200 --occlusion none",
-    );
-    assert_eq!(array(&report, "left_out").len(), 0);
-    let orders = array(&report, "orders");
-    assert!(orders.iter().any(|order| order["name"] == "bsp") && orders.len() >= 3);
-    for order in orders {
-        // Each front is before those of all boxes behind it.
-        assert_eq!(number(order, "pair_count"), 780.0, "{order}");
-        assert!(number(order, "stage_ns") > 0.0);
-    }
-}
-
 /// Rays of orthographic cameras have origins of their own.
 ///
 /// Far from zero those are rounded, behind the eye they are far from it, and triangles on edge are

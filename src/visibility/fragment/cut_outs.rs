@@ -61,12 +61,6 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// The cut-outs among some of the items, renumbered in this order.
-    pub fn some(&self, items: &[ItemId]) -> Holes {
-        let of_item = items.iter().map(|&item| self.of(item).copied()).collect();
-        Holes { of_item }
-    }
-
     /// Number of cut-outs.
     pub fn count(&self) -> usize {
         self.of_item.iter().flatten().count()

@@ -28,9 +28,6 @@ pub trait Drawable: Body {
 
     /// Tests whether the body is opaque where a ray meets it.
     fn is_opaque(&self, holes: &Holes, probe: &Self::Probe, at: &Self::At) -> bool;
-
-    /// Tests whether a ray meets the item of a part where it enters the part.
-    fn is_in(part: &WorldBox, probe: &Self::Probe, at: &Self::At) -> bool;
 }
 
 impl Drawable for SolidBox {
@@ -41,11 +38,6 @@ impl Drawable for SolidBox {
     fn is_opaque(&self, holes: &Holes, probe: &Probe, at: &Crossing) -> bool {
         holes.opaque(self.item, &self.b, probe, at)
     }
-
-    fn is_in(part: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
-        let entered = probe.enter(part, probe.ray().far);
-        entered.is_some_and(|of_part| probe.compare(at, &of_part).is_eq())
-    }
 }
 
 impl Drawable for Facet {
@@ -54,11 +46,6 @@ impl Drawable for Facet {
     }
 
     fn is_opaque(&self, _: &Holes, _: &TriangleProbe, _: &Meeting) -> bool {
-        true
-    }
-
-    /// Triangles are not cut.
-    fn is_in(_: &WorldBox, _: &TriangleProbe, _: &Meeting) -> bool {
         true
     }
 }

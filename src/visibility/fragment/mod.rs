@@ -2,8 +2,7 @@
 //!
 //! Solids are drawn sample by sample with the rays of a camera, in the order of a list; the
 //! z-test keeps the nearest, the alpha-test drops the clear parts of a mask, the
-//! stencil-test restricts the samples. The cost of an order (overdraw) and its errors are
-//! counted.
+//! stencil-test restricts the samples. The cost of an order (overdraw) is counted.
 //!
 //! A fragment is an item at a sample whose ray meets the item: where it enters it,
 //! so front faces only, as it is said where [`Solids`](super::Solids) are.
@@ -11,14 +10,12 @@
 mod canvas;
 mod cut_outs;
 mod draw;
-mod errors;
-pub mod order;
+mod order;
 
 pub use canvas::{Canvas, Rectangle, Screen, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
 pub use draw::{Drawable, Drawn, Tally, Tests};
-pub use errors::{OrderErrors, draw_orders};
-pub use order::{DepthOrder, Piece};
+pub use order::{DrawOrder, ORDERS, draw_orders};
 
 #[cfg(test)]
 mod tests;

@@ -43,6 +43,20 @@ pub struct SolidBox {
     pub item: ItemId,
 }
 
+impl SolidBox {
+    /// Some items of these boxes.
+    pub fn some<'a>(
+        boxes: &'a [WorldBox],
+        items: &'a [ItemId],
+    ) -> impl Iterator<Item = SolidBox> + 'a {
+        let body = |&item: &ItemId| SolidBox {
+            b: boxes[item as usize],
+            item,
+        };
+        items.iter().map(body)
+    }
+}
+
 impl Body for SolidBox {
     type Probe = Probe;
     type At = <Probe as Along>::At;
@@ -148,9 +162,16 @@ impl Boxes {
     /// All solids.
     pub fn of(solids: &Solids) -> Boxes {
         let numbered = solids.boxes.iter().zip(0..);
+        let all = numbered.map(|(&b, item)| SolidBox { b, item });
+        Boxes::some(solids, all.collect())
+    }
+
+    /// Some of the solids.
+    pub fn some(solids: &Solids, all: Vec<SolidBox>) -> Boxes {
+        let bounds = all.iter().map(|body| solids.outer[body.item as usize]);
         Bodies {
-            all: numbered.map(|(&b, item)| SolidBox { b, item }).collect(),
-            bounds: solids.outer.clone(),
+            bounds: bounds.collect(),
+            all,
             origin: solids.origin,
             items: solids.boxes.len(),
         }
