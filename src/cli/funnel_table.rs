@@ -6,7 +6,7 @@ use super::table::{Column, Table};
 use super::text::{self, some};
 use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
 use crate::shown::shortened;
-use crate::visibility::{Guarantee, Level};
+use crate::visibility::Guarantee;
 
 /// The chain and what it is worth; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
@@ -77,7 +77,6 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
                     sample, on one thread. A GPU does this in hardware.";
         blocks.push(Block::line(line));
     }
-    blocks.extend(saved_load(&report.level).map(Block::Line));
     let left_out = report.left_out.iter();
     let left_out = left_out.filter(|row| all || row.section == "stages");
     blocks.extend(left_out.map(|row| {
@@ -152,24 +151,6 @@ fn worth(gain: &Gain) -> String {
         (_, Some(0.0), Some(most)) => format!("<{}/{unit}", text::time(most)),
         (ns, ..) => format!("{}/{unit}", text::time(ns)),
     }
-}
-
-/// Line on the load that the selection of a level saves; none for a single level.
-fn saved_load(level: &Level) -> Option<String> {
-    let time = level.saved_load?;
-    let [lower, upper] = [time.lower?, time.upper?];
-    let others = text::counted(level.map_count - 1, "other level");
-    Some(match lower > 0.0 {
-        true => format!(
-            "Decoding the {others} of the file takes {} of wall time, which the level stage saves.",
-            text::time_plus_minus(Some(time))
-        ),
-        false => format!(
-            "Decoding the {others} of the file takes less than {} of wall time: what the level \
-             stage saves is within noise.",
-            text::time(upper)
-        ),
-    })
 }
 
 /// Boxes that were found in the solid of a scene.

@@ -22,4 +22,4 @@ macro_rules! fields {
     )*};
 }
 
-fields! { break_even_ns ns_per_step query_ns ratio saved_load_ns stage_ns us_per_second }
+fields! { break_even_ns ns_per_step query_ns ratio stage_ns us_per_second }

@@ -3,18 +3,11 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use crate::input::{InputError, is_readable, read_file, unheard};
 use crate::scene::{ItemKind, LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
-use crate::statistics::{ALPHA, Estimate, flat, trimmed_mean};
-
-/// Rounds of decoding the other maps of a file, so that the time has an interval.
-const ROUNDS: usize = 7;
-/// Longest first round that others follow.
-const LONGEST: Duration = Duration::from_secs(1);
 
 /// The level stage.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -27,9 +20,6 @@ pub struct Level {
     pub input_count: usize,
     /// Items of the selected map.
     pub output_count: usize,
-    /// Wall time of decoding the other maps; null without others, or if they take long.
-    #[serde(flatten, serialize_with = "flat::saved_load_ns")]
-    pub saved_load: Option<Estimate>,
 }
 
 impl Level {
@@ -45,7 +35,6 @@ impl Level {
             selected: scene.name.clone(),
             input_count: scene.items.len(),
             output_count: scene.items.len(),
-            saved_load: None,
         };
         let (file, selected) = split_part(source);
         let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
@@ -54,19 +43,15 @@ impl Level {
             (false, None) => return Ok(alone),
         };
         // Notes on maps that were not selected are of no interest.
-        let decode = |name: &str| {
-            let begun = Instant::now();
-            let read = || read_bytes(&bytes, [file, name], Some(name), options).ok();
+        let sized = |name: String| {
+            let read = || read_bytes(&bytes, [file, &name], Some(&name), options).ok();
             let mut map = unheard(read)?;
             if options.items == ItemKind::Triangles {
                 map = map.by_triangle(options).ok()?;
             }
-            Some((map.items.len(), begun.elapsed().as_nanos() as f64))
+            Some((name, map.items.len()))
         };
-        let begun = Instant::now();
-        // The first time is of memory that has not been read yet, and not used.
         let names = part_names(&bytes, file)?.into_iter();
-        let sized = |name: String| decode(&name).map(|(items, _)| (name, items));
         let maps: Vec<(String, usize)> = names.filter_map(sized).collect();
         let is_selected = |(name, _): &(String, usize)| {
             selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected))
@@ -76,23 +61,11 @@ impl Level {
         let Some(own) = own.or_else(|| maps.iter().rposition(is_selected)) else {
             return Ok(alone);
         };
-        let load_others = |_| {
-            let others = maps.iter().enumerate().filter(|(i, _)| *i != own);
-            let times = others.filter_map(|(_, (name, _))| decode(name));
-            times.map(|(_, ns)| ns).sum()
-        };
-        let is_timed = maps.len() > 1 && begun.elapsed() < LONGEST;
-        let rounds = if is_timed { ROUNDS } else { 0 };
-        let sums: Vec<f64> = (0..rounds).map(load_others).collect();
         Ok(Level {
             map_count: maps.len(),
             selected: maps[own].0.clone(),
             input_count: maps.iter().map(|(_, items)| items).sum(),
             output_count: maps[own].1,
-            saved_load: trimmed_mean(&sums).map(|saved| {
-                let (lower, upper) = saved.interval(1.0 - ALPHA);
-                Estimate::within(saved.mean, [lower.max(0.0), upper])
-            }),
         })
     }
 }
@@ -183,8 +156,6 @@ mod tests {
         assert_eq!((level.map_count, &level.selected[..]), (2, "MAP20"));
         assert_eq!(level.output_count, scene.items.len());
         assert_eq!(level.input_count, other.items.len() + scene.items.len());
-        let saved = level.saved_load.expect("another map");
-        assert!(saved.value > 0.0 && saved.lower <= saved.upper);
     }
 
     #[test]
@@ -247,6 +218,5 @@ mod tests {
         let scene = scene::load("city:n=50", &Default::default()).expect("a scene");
         let level = Level::of("city:n=50", &scene, &Default::default()).expect("a level");
         assert_eq!((level.input_count, level.output_count), (50, 50));
-        assert_eq!(level.saved_load, None, "no other map, and so no time");
     }
 }
