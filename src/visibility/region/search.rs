@@ -12,24 +12,15 @@ use crate::visibility::Rays;
 /// Most different windows of a region; further ones are the whole image.
 ///
 /// Bounds the time where many ways lead to one region.
-const MOST_WINDOWS: u32 = 32;
+const MOST_WINDOWS: usize = 32;
 
 /// Memory of a search.
 #[derive(Clone, Default, Debug)]
 pub struct Search {
-    /// All entries of regions, in the order of the search.
-    entries: Vec<Entry>,
-    /// Last entry plus one, and number of entries, of each region that is seen.
-    last: Vec<(u32, u32)>,
-}
-
-/// A region seen through a window.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    region: RegionId,
-    window: Window,
-    /// The entry before it of the same region, plus one.
-    before: u32,
+    /// All entries of regions through windows, in the order of the search.
+    entries: Vec<(RegionId, Window)>,
+    /// The windows of each region that is seen.
+    windows: Vec<Vec<Window>>,
 }
 
 impl Search {
@@ -37,14 +28,15 @@ impl Search {
     pub fn run(&mut self, graph: &RegionGraph, rays: &Rays, homes: &[RegionId], seen: &mut IdSet) {
         let view = &View::of(rays);
         self.entries.clear();
-        self.last.resize(graph.len().max(self.last.len()), (0, 0));
+        let regions = graph.len().max(self.windows.len());
+        self.windows.resize_with(regions, Vec::new);
         for &home in homes {
             if !self.is_entered(seen, home, view.window) {
                 self.enter(home, view.window);
             }
         }
         let mut next = 0;
-        while let Some(&Entry { region, window, .. }) = self.entries.get(next) {
+        while let Some(&(region, window)) = self.entries.get(next) {
             next += 1;
             for &exit in &graph.exits[region as usize] {
                 let opening = &graph.openings[exit as usize];
@@ -56,7 +48,7 @@ impl Search {
                     continue;
                 };
                 if !self.is_entered(seen, entered, narrowed) {
-                    let window = match self.last[entered as usize].1 < MOST_WINDOWS {
+                    let window = match self.windows[entered as usize].len() < MOST_WINDOWS {
                         true => narrowed,
                         false => view.window,
                     };
@@ -68,29 +60,16 @@ impl Search {
 
     /// Tests whether an earlier window of a region holds a window.
     fn is_entered(&mut self, seen: &mut IdSet, region: RegionId, window: Window) -> bool {
+        let earlier = &mut self.windows[region as usize];
         if seen.insert(region) {
-            self.last[region as usize] = (0, 0);
-            return false;
+            earlier.clear();
         }
-        let mut earlier = self.last[region as usize].0;
-        while earlier > 0 {
-            let entry = &self.entries[earlier as usize - 1];
-            if is_within(window, entry.window) {
-                return true;
-            }
-            earlier = entry.before;
-        }
-        false
+        earlier.iter().any(|earlier| is_within(window, *earlier))
     }
 
     fn enter(&mut self, region: RegionId, window: Window) {
-        let (before, count) = self.last[region as usize];
-        self.entries.push(Entry {
-            region,
-            window,
-            before,
-        });
-        self.last[region as usize] = (self.entries.len() as u32, count + 1);
+        self.entries.push((region, window));
+        self.windows[region as usize].push(window);
     }
 }
 
