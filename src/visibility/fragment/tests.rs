@@ -86,7 +86,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
     assert!(seen > 100, "the premise: {seen}");
 }
 
-/// Sorted boxes have overlaps that no order shades once, but fewer than listed ones.
+/// No order of whole boxes shades each sample once, but a sorted one fewer twice.
 #[test]
 fn fewer_fragments_are_shaded_from_front_to_back() {
     let solids = Solids::of(&load("city:n=800", &Default::default()).unwrap());

@@ -26,7 +26,7 @@ pub type Window = [f64; 4];
 /// The sum is far below the 2^-36 |n| X that thresholds are shifted by.
 const SLACK: f64 = 1.0 / (1u64 << 36) as f64;
 
-/// A side of the image: `normal . x >= 0`, a half-space whose plane passes through the eye.
+/// A side of the image: the half-space `normal . x >= 0`, its plane through the eye.
 #[derive(Clone, Copy, Debug)]
 struct Side {
     /// Not of unit length.
@@ -78,8 +78,9 @@ impl View {
         DVec3::new(u.dot(d), v.dot(d), forward.dot(d))
     }
 
-    /// The smallest window that surely holds the opening's part of the image; `None` if it
-    /// is surely not in the image, or beyond the far plane. Grown by the slack.
+    /// The smallest window that surely holds an opening, grown by the slack.
+    ///
+    /// `None` if it is surely not in the image, or beyond the far plane.
     pub fn rectangle(&self, opening: &Opening) -> Option<Window> {
         let corners = opening.corners.map(|c| self.turned(c - self.eye));
         let sizes = corners.map(|c| c.abs().element_sum());

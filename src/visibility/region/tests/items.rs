@@ -8,8 +8,9 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::SeededRng;
 use crate::visibility::{Rays, Solids};
 
-/// How many first hits of rays are not among the items of the regions that the search
-/// lists. Eyes are anywhere, in walls too; the near plane is sometimes behind a wall.
+/// How many first hits of rays are not among the items of the listed regions.
+///
+/// Eyes are anywhere, in walls too; the near plane is sometimes behind a wall.
 fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> usize {
     let (scene, _) = rooms(world);
     let graph = Arc::new(graph_of(&scene));

@@ -64,7 +64,7 @@ fn chain(rng: &mut SeededRng, base: DVec3, length: usize, shrink: f64, margins: 
     }
 }
 
-/// Number of times that the search loses the last room of an accepted line of sight.
+/// How often the search loses the last room of an accepted line of sight.
 ///
 /// And the number of times that the line was accepted.
 fn lost(shrink: f64) -> (usize, usize) {
