@@ -26,7 +26,7 @@ pub type Window = [f64; 4];
 /// The sum is far below the 2^-36 |n| X that thresholds are shifted by.
 const SLACK: f64 = 1.0 / (1u64 << 36) as f64;
 
-/// A side of the image: the half-space `normal . x >= 0`, its plane through the eye.
+/// A side of the image: `normal . x >= 0`, a plane through the eye.
 #[derive(Clone, Copy, Debug)]
 struct Side {
     /// Not of unit length.
