@@ -157,10 +157,8 @@ impl TriangleStage {
                 [&faces.given, &kept, right].map(|of| of.triangles() as u64);
             ViewCounts {
                 input,
-                hidden: input - truth,
                 output,
                 truth,
-                false_positives: kept.without(right) as u64,
                 false_negatives: right.without(&kept) as u64,
                 ..ViewCounts::default()
             }

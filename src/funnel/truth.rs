@@ -113,12 +113,8 @@ pub struct ViewCounts {
     pub input: u64,
     /// Returned candidates.
     pub output: u64,
-    /// Candidates that are not visible.
-    pub hidden: u64,
     /// Visible candidates.
     pub truth: u64,
-    /// Returned, though not visible.
-    pub false_positives: u64,
     /// Visible candidates that are not returned.
     pub false_negatives: u64,
     /// Samples whose front item is one of them.
@@ -127,6 +123,18 @@ pub struct ViewCounts {
     pub worst_missing_samples: u64,
     /// Samples with an item in front.
     pub samples: u64,
+}
+
+impl ViewCounts {
+    /// Candidates that are not visible.
+    pub fn hidden(&self) -> u64 {
+        self.input - self.truth
+    }
+
+    /// Returned, though not visible.
+    pub fn false_positives(&self) -> u64 {
+        self.output + self.false_negatives - self.truth
+    }
 }
 
 /// Counts of a stage that got `input` (`None`: `all` items) and returned `output`.
@@ -143,7 +151,6 @@ pub fn count_items(
     let input = input.map_or(all, <[ItemId]>::len) as u64;
     let mut counts = ViewCounts {
         input,
-        hidden: input - given,
         output: output.len() as u64,
         truth: given,
         ..ViewCounts::default()
@@ -158,7 +165,6 @@ pub fn count_items(
             counts.worst_missing_samples = counts.worst_missing_samples.max(samples);
         }
     }
-    counts.false_positives = counts.output + counts.false_negatives - counts.truth;
     counts
 }
 
@@ -202,14 +208,14 @@ impl Errors {
             input_count: mean(|v| v.input),
             output_count: mean(|v| v.output),
             truth_count: mean(|v| v.truth),
-            false_positive_count: mean(|v| v.false_positives),
+            false_positive_count: mean(ViewCounts::false_positives),
             false_negative_count: mean(|v| v.false_negatives),
-            excess: rate_of(views, |v| [v.false_positives, v.truth]),
+            excess: rate_of(views, |v| [v.false_positives(), v.truth]),
             missing: share(|v| [v.false_negatives, v.truth]),
             image_error: share(|v| [v.missing_samples, v.samples]),
             worst_missing_samples: worst.unwrap_or(0),
             longest_missing_streak: streaks.map(<[_]>::len).max().unwrap_or(0),
-            removed_share: share(|v| [v.hidden.saturating_sub(v.false_positives), v.hidden]),
+            removed_share: share(|v| [v.hidden().saturating_sub(v.false_positives()), v.hidden()]),
         }
     }
 }
@@ -222,7 +228,7 @@ mod tests {
     fn errors_are_counted_by_item_and_by_sample() {
         let visible = [(2, 10), (5, 1), (9, 4)];
         let counts = count_items(None, 12, &[1, 2, 3, 9], &visible);
-        assert_eq!((counts.false_positives, counts.false_negatives), (2, 1));
+        assert_eq!((counts.false_positives(), counts.false_negatives), (2, 1));
         assert_eq!(
             (counts.missing_samples, counts.worst_missing_samples),
             (1, 1)
@@ -230,21 +236,19 @@ mod tests {
         assert_eq!((counts.samples, counts.truth), (15, 3));
         // The loss of a stage before is not counted again.
         let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 9], &visible);
-        assert_eq!((counts.input, counts.hidden, counts.truth), (5, 3, 2));
-        assert_eq!((counts.false_positives, counts.false_negatives), (1, 0));
+        assert_eq!((counts.input, counts.hidden(), counts.truth), (5, 3, 2));
+        assert_eq!((counts.false_positives(), counts.false_negatives), (1, 0));
         assert_eq!((counts.samples, counts.missing_samples), (15, 0));
         assert_eq!(count_items(None, 12, &[], &visible).false_negatives, 3);
-        assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives, 2);
+        assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives(), 2);
     }
 
     #[test]
     fn streaks_are_of_views_one_after_the_other() {
         let view = |false_negatives| ViewCounts {
             input: 10,
-            hidden: 6,
             output: 6,
             truth: 4,
-            false_positives: 2 + false_negatives,
             false_negatives,
             ..ViewCounts::default()
         };

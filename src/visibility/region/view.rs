@@ -26,15 +26,6 @@ pub type Window = [f64; 4];
 /// The sum is far below the 2^-36 |n| X that thresholds are shifted by.
 const SLACK: f64 = 1.0 / (1u64 << 36) as f64;
 
-/// A side of the image: `normal . x >= 0`, a plane through the eye.
-#[derive(Clone, Copy, Debug)]
-struct Side {
-    /// Not of unit length.
-    normal: DVec3,
-    /// At least the normal's length; errors are relative to it.
-    bound: f64,
-}
-
 /// A camera and the sides of its image.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -44,8 +35,8 @@ pub struct View {
     /// The whole image.
     pub window: Window,
     far: f64,
-    /// Left, right, bottom, top.
-    sides: [Side; 4],
+    /// Normals of the planes through the eye and each side, not of unit length.
+    sides: [DVec3; 4],
 }
 
 impl View {
@@ -54,43 +45,34 @@ impl View {
         let camera = &rays.camera;
         let frame = &camera.frame;
         let window @ [left, right, bottom, top] = rays.window;
-        let side = |x: f64, y: f64, z: f64| Side {
-            normal: DVec3::new(x, y, z),
-            bound: DVec3::new(x, y, z).abs().element_sum(),
-        };
         View {
             eye: frame.eye,
             axes: [frame.u(), frame.v(), frame.forward()],
             window,
             far: camera.lens.far().unwrap_or(f64::INFINITY),
             sides: [
-                side(1.0, 0.0, -left),
-                side(-1.0, 0.0, right),
-                side(0.0, 1.0, -bottom),
-                side(0.0, -1.0, top),
+                DVec3::new(1.0, 0.0, -left),
+                DVec3::new(-1.0, 0.0, right),
+                DVec3::new(0.0, 1.0, -bottom),
+                DVec3::new(0.0, -1.0, top),
             ],
         }
-    }
-
-    /// A vector in camera coordinates.
-    fn turned(&self, d: DVec3) -> DVec3 {
-        let [u, v, forward] = self.axes;
-        DVec3::new(u.dot(d), v.dot(d), forward.dot(d))
     }
 
     /// The smallest window that surely holds an opening, grown by the slack.
     ///
     /// `None` if it is surely not in the image, or beyond the far plane.
     pub fn rectangle(&self, opening: &Opening) -> Option<Window> {
-        let corners = opening.corners.map(|c| self.turned(c - self.eye));
+        let corners = opening.corners.map(|c| c - self.eye);
+        let corners = corners.map(|d| DVec3::from(self.axes.map(|axis| axis.dot(d))));
         let sizes = corners.map(|c| c.abs().element_sum());
         let reach = sizes.into_iter().fold(0.0, f64::max);
         if corners.iter().all(|c| c.z - reach * SLACK > self.far) {
             return None;
         }
-        let outside = |side: &Side| {
-            let slack = SLACK * side.bound * reach;
-            corners.iter().all(|c| side.normal.dot(*c) < -slack)
+        let outside = |normal: &DVec3| {
+            let slack = SLACK * normal.abs().element_sum() * reach;
+            corners.iter().all(|c| normal.dot(*c) < -slack)
         };
         if self.sides.iter().any(outside) {
             return None;
