@@ -7,6 +7,7 @@ use super::text::{self, some};
 use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
 use crate::shown::shortened;
 use crate::visibility::Guarantee;
+use crate::visibility::fragment::Tally;
 
 /// The chain and what it is worth; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
@@ -197,20 +198,19 @@ pub fn count(mean: f64) -> String {
 
 /// The tests of the fragment stage, if there are several to compare.
 fn fragments(report: &FunnelReport) -> Table {
-    let mut table =
-        Table::of("test | >samples tested | >kept out | >fragments | >clear | >shaded | >covered");
-    for row in &report.stages {
-        let Some(counts) = row.fragments else {
-            continue;
-        };
-        let counts = counts.in_order().into_iter().map(count);
-        let name = row.back_end.name.to_owned();
-        table.add_row([name].into_iter().chain(counts));
-    }
-    if table.rows.len() < 2 {
-        table.rows.clear();
-    }
-    table
+    let columns: &[Column<(&'static str, Tally<f64>)>] = &[
+        ("test", |(name, _)| (*name).to_owned()),
+        (">samples tested", |(_, of)| count(of.asked_count)),
+        (">kept out", |(_, of)| count(of.kept_out_count)),
+        (">fragments", |(_, of)| count(of.fragment_count)),
+        (">clear", |(_, of)| count(of.clear_count)),
+        (">shaded", |(_, of)| count(of.shaded_count)),
+        (">covered", |(_, of)| count(of.covered_count)),
+    ];
+    let tests = report.stages.iter();
+    let tests = tests.filter_map(|row| Some((row.back_end.name, row.fragments?)));
+    let tests: Vec<_> = tests.collect();
+    Table::with(if tests.len() < 2 { vec![] } else { tests }, columns)
 }
 
 fn orders(report: &FunnelReport) -> Table {

@@ -23,18 +23,6 @@ use crate::visibility::truth::{Facet, SolidBox};
 pub type FragmentCounts = Tally<f64>;
 
 impl FragmentCounts {
-    /// All of them, in the order of the fields.
-    pub fn in_order(&self) -> [f64; 6] {
-        [
-            self.asked_count,
-            self.kept_out_count,
-            self.fragment_count,
-            self.clear_count,
-            self.shaded_count,
-            self.covered_count,
-        ]
-    }
-
     /// `None` without views.
     pub(super) fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
         let views = tallies.len() as f64;
