@@ -7,7 +7,7 @@ use super::fragment_stage::FragmentCounts;
 use super::item_stages::PlanView;
 use super::orders::OrderRow;
 use super::picks::PickRow;
-use super::stage::{BackEnd, Chain, STENCIL, StageKind, default_test};
+use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, default_test};
 use super::task::FunnelKey;
 use super::truth::Errors;
 use crate::measure::OverProcesses;
@@ -143,9 +143,16 @@ impl StageRow {
         })
     }
 
+    /// Its task in its place in a chain; `None` for [`NONE`].
     pub(super) fn key(&self, chain: &Chain) -> Option<FunnelKey> {
         let name = self.structure.as_deref().unwrap_or(self.back_end.name);
-        FunnelKey::of_stage(chain, self.back_end.stage, name)
+        match self.back_end.stage {
+            _ if name == NONE => None,
+            stage @ (StageKind::Triangle | StageKind::Fragment) => {
+                Some(FunnelKey::Stage(stage, name.to_owned()))
+            }
+            stage => Some(FunnelKey::Steps(chain.steps_with(stage, name))),
+        }
     }
 
     pub(super) fn set(&mut self, chain: &Chain, times: &OverProcesses<FunnelKey>) {

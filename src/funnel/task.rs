@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::stage::{Chain, NONE, StageKind, Step};
+use super::stage::{StageKind, Step};
 use super::world::FunnelInput;
 use crate::measure::{Ask, OverProcesses, ProcessTimes, StudyPlan, TimedTask};
 use crate::visibility::fragment::DrawOrder;
@@ -38,19 +38,6 @@ pub enum FunnelKey {
     Order(DrawOrder),
     /// A back end of picking.
     Pick(PickQuestion, String),
-}
-
-impl FunnelKey {
-    /// A back end of a stage in its place in a chain; `None` for [`NONE`].
-    pub fn of_stage(chain: &Chain, stage: StageKind, name: &str) -> Option<FunnelKey> {
-        match stage {
-            _ if name == NONE => None,
-            StageKind::Triangle | StageKind::Fragment => {
-                Some(FunnelKey::Stage(stage, name.to_owned()))
-            }
-            _ => Some(FunnelKey::Steps(chain.steps_with(stage, name))),
-        }
-    }
 }
 
 /// A task of the timed pass; the number of ids that it appends is checked.

@@ -2,8 +2,6 @@
 //!
 //! A mask is a pure function of a place on a face; it needs no texture.
 
-use std::fmt::{self, Display, Formatter};
-
 use serde::Serialize;
 
 use crate::query::ItemId;
@@ -100,14 +98,6 @@ pub struct CutOuts {
     pub tile: f64,
     /// Seed of the choice of items.
     pub seed: u64,
-}
-
-/// The text as typed.
-impl Display for CutOuts {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (mask, tile, seed) = (self.mask.name(), self.tile, self.seed);
-        write!(f, "{mask}:share={},tile={tile},seed={seed}", self.share)
-    }
 }
 
 impl CutOuts {
