@@ -34,7 +34,7 @@ impl StructureChoice {
     /// From what a run measures of all structures on one scene and path.
     pub(super) fn of(cells: &[ReportCell]) -> StructureChoice {
         let mut rows = cells.to_vec();
-        // Wrong answers and fat bounds below: they have no rank.
+        // Wrong answers below: they have no rank.
         rows.sort_by(|a, b| {
             let order = a.rank.is_none().cmp(&b.rank.is_none());
             order.then(or_last(ns(a)).total_cmp(&or_last(ns(b))))
@@ -98,7 +98,7 @@ pub(super) fn time_over(cells: &[ReportCell], own: &str, other: &str) -> Option<
 
 /// The fastest structure and those that tie with it.
 pub(super) fn fastest(cells: &[ReportCell]) -> Vec<&ReportCell> {
-    // Wrong answers, and sets of fat bounds, have no rank.
+    // Wrong answers have no rank.
     let sound = |cell: &&ReportCell| cell.rank.is_some() && ns(cell).is_some();
     let mut sound: Vec<&ReportCell> = cells.iter().filter(sound).collect();
     sound.sort_by(|a, b| or_last(ns(a)).total_cmp(&or_last(ns(b))));

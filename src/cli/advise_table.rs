@@ -2,7 +2,7 @@
 
 use super::document::Block;
 use super::run_table::{heads, structures};
-use super::run_verdict::{gains, is_fat, times};
+use super::run_verdict::{gains, times};
 use super::table::{Column, Table};
 use super::text::{self, significant, some, time, time_within};
 use crate::advise::{Advice, Axis, Check, Omission, Side, TestRow, ns, policy_of};
@@ -45,7 +45,7 @@ fn compared(rows: &[ReportCell]) -> Comparison<'_> {
 fn taken(advice: &Advice) -> String {
     let choice = &advice.structure;
     let Some(name) = &choice.name else {
-        return "No structure with exact bounds answered right".to_owned();
+        return "No structure answered right".to_owned();
     };
     let mut others = choice.rows[1..].iter().filter(|row| row.rank.is_some());
     let next = others.find(|row| !choice.ties.contains(&row.structure));
@@ -68,8 +68,7 @@ fn in_motion(advice: &Advice) -> Option<String> {
     let frame = ns(row)?;
     let longer = others.iter().filter_map(|row| {
         let (policy, longer) = (policy_of(&row.structure), times(ns(row)? / frame));
-        let more = ["", " and returns more"][usize::from(is_fat(&row))];
-        Some(format!("{policy} takes {longer} as long{more}"))
+        Some(format!("{policy} takes {longer} as long"))
     });
     let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
         let longer = times(builds / frame);

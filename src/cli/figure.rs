@@ -397,7 +397,8 @@ mod tests {
         }
         // Parameters and policies keep the colour, and have marks of their own.
         for name in ["wide", "bvh", "peer-bvh"] {
-            let looks = ["", "@rebuild", "@fat=1"].map(|rest| Look::of(&format!("{name}{rest}")));
+            let looks =
+                ["", "@rebuild", "@every=10"].map(|rest| Look::of(&format!("{name}{rest}")));
             assert!(looks.iter().all(|look| look.colour == looks[0].colour));
             assert!(looks[1].hollow && looks[2].hollow);
             let shapes = looks.map(|look| look.shape);

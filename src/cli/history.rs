@@ -6,13 +6,10 @@ use super::document::{Block, to_html};
 use super::figure::{Axis, ends, is_drawn};
 use super::page::glossary;
 use super::run_table::distinct;
-use super::run_verdict::is_fat;
 use super::table::{Column, Table};
 use super::{program, text};
 use crate::measure::Metric;
-use crate::report::{
-    Report, ReportCell, RunInfo, asked_otherwise, grouped, settings, timed_otherwise,
-};
+use crate::report::{Report, RunInfo, asked_otherwise, grouped, settings, timed_otherwise};
 
 /// Digits of a commit that name it.
 const COMMIT: usize = 7;
@@ -57,7 +54,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
         let mut table = Table::of_numbers(["structure"].into_iter().chain(names));
         let mut series = Vec::new();
         for (structure, cells) in grouped(cells.into_iter()) {
-            let sound = cells.iter().filter(|(_, cell)| is_right(cell));
+            let sound = cells.iter().filter(|(_, cell)| cell.rank.is_some());
             let last = sound.clone().next_back().map(|(_, cell)| *cell);
             // The same name does not make it the same question.
             let differs = |cell| {
@@ -79,7 +76,7 @@ pub fn page(mut reports: Vec<Report>) -> String {
                 match times.iter().find(|time| time.0 == run) {
                     Some((_, time)) => text::time_with(time),
                     None => text::some(cell, |(_, cell)| {
-                        let why = differs(*cell).filter(|_| is_right(cell));
+                        let why = differs(*cell).filter(|_| cell.rank.is_some());
                         why.unwrap_or_else(|| cell.status.name().to_owned())
                     }),
                 }
@@ -155,11 +152,6 @@ fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
         "Over {runs} {cells} {take} {factor} x as long in the last run that has times of them as in \
          the first, by program and machine together. compare judges two runs.{note}"
     )
-}
-
-/// Returns true for right answers that were timed, of enlarged bounds too.
-fn is_right(cell: &ReportCell) -> bool {
-    cell.rank.is_some() || is_fat(&cell)
 }
 
 fn runs(reports: &[Report], names: &[String]) -> Table {

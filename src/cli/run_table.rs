@@ -72,12 +72,9 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     });
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
-    let counted = comparison.cells.iter().find_map(|cell| {
-        // Fat bounds return more than the test does.
-        let exact = 1.0 + cell.value("fat_excess").unwrap_or(0.0);
-        Some((1.0 - cell.value("cull_rate")?) / exact)
-    });
-    let visible = counted.map(|share| {
+    let culled = comparison.of_any("cull_rate");
+    let visible = culled.map(|culled| {
+        let share = 1.0 - culled;
         let returned = text::short_percent(share);
         let seen = excess.map(|excess| text::short_percent(share / (1.0 + excess)));
         match seen {
@@ -130,9 +127,8 @@ pub const OF_QUERIES: [Figure; 10] = [
 
 /// Figures of frames, before the first two of queries.
 ///
-/// A summary of a motion has the first four and `x after 100`.
-pub const OF_FRAMES: [Figure; 9] = [
-    ("returned in excess", "fat_excess", text::percent),
+/// A summary of a motion has the first three and `x after 100`.
+pub const OF_FRAMES: [Figure; 8] = [
     ("worst", "worst_frame_ns", text::time),
     ("update", "update_ns", text::time),
     ("query", "query_ns", text::time),
@@ -153,7 +149,7 @@ pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) ->
         (true, true) => OF_QUERIES.to_vec(),
         (true, false) => OF_QUERIES[..2].to_vec(),
         (false, true) => [&OF_FRAMES, &OF_QUERIES[..2]].concat(),
-        (false, false) => [&OF_FRAMES[..4], &OF_FRAMES[7..8]].concat(),
+        (false, false) => [&OF_FRAMES[..3], &OF_FRAMES[6..7]].concat(),
     };
     let peer = comparison.fastest_peer().filter(|_| is_full);
     let of_base = text::some(base, |base| format!("vs {}", text::plain(base)));

@@ -44,19 +44,16 @@ pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
     told.join(" ")
 }
 
-/// Remarks on fat bounds, rebuilds that do not come, and dropped contacts.
+/// Remarks on rebuilds that do not come, and on dropped contacts.
 fn caveats(all: &[&Comparison]) -> Vec<String> {
-    let cells = || all.iter().flat_map(|c| &c.cells);
-    let fat = "Rank -: none, as fat bounds return more than exact ones.".to_owned();
-    let mut told: Vec<String> = cells().any(is_fat).then_some(fat).into_iter().collect();
-    let late = cells().filter_map(|cell| {
+    let late = all.iter().flat_map(|c| &c.cells).filter_map(|cell| {
         let (_, every) = cell.structure.split_once("@every=")?;
         let frames = cell.times.cameras_checked / cell.path.views_per_frame.max(1);
         let is_late = frames > 0 && every.parse::<usize>().ok()? > frames;
         let frames = text::counted(frames, "frame");
         is_late.then(|| format!("@every={every}: no rebuild in {frames}."))
     });
-    told.extend(late.collect::<BTreeSet<_>>());
+    let mut told: Vec<String> = late.collect::<BTreeSet<_>>().into_iter().collect();
     let dropped = all.iter().filter_map(|c| c.of_any("touch_dropped_count"));
     let dropped = dropped.fold(0.0, f64::max);
     if dropped > 0.0 {
@@ -65,11 +62,6 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
         told.push(format!("{dropped} {what}."));
     }
     told
-}
-
-/// Returns true for enlarged bounds that have returned more than exact ones.
-pub fn is_fat(cell: &&ReportCell) -> bool {
-    cell.value("fat_excess") > Some(0.0)
 }
 
 /// Wall time, gain and CPU time of work that threads share.
@@ -92,7 +84,6 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         let why = match scene.total_count {
             0 if scene.digest.is_empty() => "no process finished a measurement",
             0 => "the scene has no items",
-            _ if comparison.cells.iter().any(is_fat) => "no structure with exact bounds has times",
             _ => "no structure has times of right answers",
         };
         return format!("Nothing is ranked: {why}.");
@@ -164,7 +155,7 @@ fn repaid(comparison: &Comparison, base: Option<&str>) -> Option<String> {
 
 /// Checks of the answers: by the reference scan, and in exact arithmetic.
 fn checked(all: &[&Comparison]) -> Option<String> {
-    let cells = || all.iter().flat_map(|c| &c.cells).filter(|c| !is_fat(c));
+    let cells = || all.iter().flat_map(|c| &c.cells);
     let tried = cells().filter(|c| c.status != Status::LeftOut).count();
     let right = cells().filter(|cell| cell.status == Status::Ok).count();
     let most = |of: fn(&ReportCell) -> usize| {
@@ -175,9 +166,6 @@ fn checked(all: &[&Comparison]) -> Option<String> {
     let timed = most(|cell| cell.times.cameras_timed);
     let judged = all.iter().filter_map(|c| c.of_any("judged_queries"));
     let who = match right {
-        _ if right == tried && all.iter().flat_map(|c| &c.cells).any(is_fat) => {
-            "All structures with exact bounds".to_owned()
-        }
         _ if right == tried => "All structures".to_owned(),
         _ if all.len() == 1 => format!("{right} of {tried} structures"),
         _ => format!("{} of {} cells", text::count(right), text::count(tried)),

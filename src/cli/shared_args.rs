@@ -99,7 +99,7 @@ pub struct MotionArgs {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "motion", value_parser = values::whole(1..=1000usize))]
     pub views: usize,
     /// Work of a frame, a row for each: refit, rebuild, every=N (rebuilt in every n-th
-    /// frame), fat=M (bounds enlarged by M item sizes: fewer updates, more is returned)
+    /// frame)
     #[arg(long, value_name = "LIST", requires = "motion")]
     pub update: Option<String>,
 }
@@ -137,7 +137,7 @@ impl MotionArgs {
 /// The structures under each policy of a comma-separated list, `wide@every=10`.
 ///
 /// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
-/// refit is built again in any case: it appears once beside fat bounds.
+/// refit is built again in any case: it appears once.
 fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSpec>> {
     let mut policies: Vec<UpdatePolicy> = Vec::new();
     for text in list.split(',').map(str::trim) {
@@ -153,9 +153,8 @@ fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSp
     for spec in specs {
         for &policy in &policies {
             let mut own = spec.clone();
-            let differs = spec.info().refits || matches!(policy, UpdatePolicy::Fat(_));
-            own.policy = if differs { policy } else { UpdatePolicy::Refit };
-            if own.policy != UpdatePolicy::Refit {
+            if spec.info().refits && policy != UpdatePolicy::Refit {
+                own.policy = policy;
                 own.label += &format!("@{policy}");
             }
             if all.iter().all(|entered| entered.label != own.label) {
@@ -396,15 +395,16 @@ mod tests {
             let all = under_policies(list, &specs).map_err(|e| e.to_string())?;
             Ok(all.into_iter().map(|spec| spec.label).collect())
         };
-        let all = "wide,wide@rebuild,wide@every=10,wide@fat=0.1,octree-textbook,\
-                   octree-textbook@fat=0.1";
-        let found = labels("refit,rebuild,every=10,fat=10%").unwrap();
-        assert_eq!(found.join(","), all);
+        let found = labels("refit,rebuild,every=10").unwrap();
+        assert_eq!(
+            found.join(","),
+            "wide,wide@rebuild,wide@every=10,octree-textbook"
+        );
         assert_eq!(
             labels("rebuild").unwrap(),
             ["wide@rebuild", "octree-textbook"]
         );
-        for bad in ["", "often", "every", "every=1", "fat=0", "fat=x", "refit=1"] {
+        for bad in ["", "often", "every", "every=1", "every=x", "refit=1"] {
             let error = labels(bad).unwrap_err();
             assert!(error.contains("expected refit, rebuild"), "{bad}: {error}");
         }

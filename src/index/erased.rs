@@ -15,7 +15,7 @@ use crate::kernel::{Isa, Kernel, Plain, Work};
 use crate::query::{
     AnyVolume, Dispatched, ItemId, Located, NoRecorder, QueryContext, QueryCost, each_volume,
 };
-use crate::spec::{SpecError, parse_number};
+use crate::spec::SpecError;
 
 /// Runs a closure; returns the message of a panic. The state that the closure has
 /// changed by then stays as it is and must not be relied upon.
@@ -38,10 +38,6 @@ pub enum UpdatePolicy {
     Rebuild,
     /// A new build in every n-th frame, refits in the others.
     Every(u32),
-    /// Bounds enlarged by this part of an item's size on each side.
-    ///
-    /// Only items that have left theirs are updated; queries return false positives.
-    Fat(f64),
 }
 
 impl fmt::Display for UpdatePolicy {
@@ -50,7 +46,6 @@ impl fmt::Display for UpdatePolicy {
             UpdatePolicy::Refit => f.write_str("refit"),
             UpdatePolicy::Rebuild => f.write_str("rebuild"),
             UpdatePolicy::Every(frames) => write!(f, "every={frames}"),
-            UpdatePolicy::Fat(margin) => write!(f, "fat={margin}"),
         }
     }
 }
@@ -59,22 +54,17 @@ impl FromStr for UpdatePolicy {
     type Err = SpecError;
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
-        let (name, value) = text.split_once('=').unwrap_or((text, ""));
-        let whole = || value.parse().ok().filter(|n| (2..=1_000_000).contains(n));
-        let margin = || parse_number(value).filter(|m| *m > 0.0 && *m <= 100.0);
-        let found = match name {
-            "every" => whole().map(UpdatePolicy::Every),
-            "fat" => margin().map(UpdatePolicy::Fat),
-            _ if text == "refit" => Some(UpdatePolicy::Refit),
-            _ if text == "rebuild" => Some(UpdatePolicy::Rebuild),
-            _ => None,
-        };
-        found.ok_or_else(|| {
-            SpecError::new(format_args!(
-                "--update '{text}'; expected refit, rebuild, every=N (frames, at least 2) or \
-                 fat=M (margin in item sizes, above 0 to 100)"
-            ))
-        })
+        let every = text
+            .strip_prefix("every=")
+            .and_then(|n| n.parse::<u32>().ok());
+        match (text, every) {
+            ("refit", _) => Ok(UpdatePolicy::Refit),
+            ("rebuild", _) => Ok(UpdatePolicy::Rebuild),
+            (_, Some(frames @ 2..=1_000_000)) => Ok(UpdatePolicy::Every(frames)),
+            _ => Err(SpecError::new(format_args!(
+                "--update '{text}'; expected refit, rebuild or every=N (frames, at least 2)"
+            ))),
+        }
     }
 }
 

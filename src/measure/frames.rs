@@ -60,13 +60,6 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
             let counted = guarded(|| entry.count(frames, notice));
             let failed = counted.unwrap_or_else(Err).err();
             let missed = frames.judged.and_then(|judged| judged.unsafe_verdict());
-            let missed = missed.map(|missed| match (subject.spec.policy, missed.reason) {
-                (UpdatePolicy::Fat(_), Some(reason)) => {
-                    let what = "by the items' own bounds; fat ones are not judged";
-                    Verdict::new(missed.status, format!("{reason}, {what}"))
-                }
-                (_, reason) => Verdict { reason, ..missed },
-            });
             entry.part.verdict = failed.or(missed).unwrap_or_default();
         }
         entries.push(entry);
@@ -114,7 +107,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
 
 /// False for a structure that is built again in every frame or in every n-th.
 fn ages(spec: &StructureSpec) -> bool {
-    spec.info().refits && !matches!(spec.policy, UpdatePolicy::Rebuild | UpdatePolicy::Every(_))
+    spec.info().refits && spec.policy == UpdatePolicy::Refit
 }
 
 impl Entry<'_> {
@@ -153,14 +146,7 @@ impl Entry<'_> {
             costs: [cost, QueryCost::default()],
             ..Counted::default()
         };
-        let mut counts = counts(&counted, frames.workload.scene.items.len());
-        if let UpdatePolicy::Fat(_) = self.subject.spec.policy {
-            let total = |all: &[Answer]| all.iter().map(|a| a.count).sum::<u64>() as f64;
-            let visible = total(&frames.right);
-            let excess = (total(&counted.answers[0]) - visible) / visible.max(1.0);
-            counts.insert("fat_excess".to_owned(), excess);
-        }
-        self.part.counts = counts;
+        self.part.counts = counts(&counted, frames.workload.scene.items.len());
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
         let chose = moving.index.chose();
         let chose = match self.subject.spec.policy {

@@ -102,7 +102,6 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "regions_found", "regions", Of::Count, "regions that hold the eye, mean over the path";
     "views_wall_ns", "ns", Of::Wall(TaskKind::Views), "wall time per view where threads share the views of all timed cameras (--threads above 1)";
     "frame_ns", "ns", Of::Time(TaskKind::Frame), "CPU time per frame of a motion (of all threads with --threads above 1), update and all queries, mean over the frames; as query_ns, which is then the first query after each update";
-    "fat_excess", "1", Of::Count, "items that enlarged bounds (--update fat=M) return in excess / items that exact bounds return";
     "update_ns", "ns", Of::Time(TaskKind::Update), "CPU time of the update of a frame, mean over the frames; as query_ns";
     "further_query_ns", "ns", Of::Time(TaskKind::Further), "thread CPU time of a query after the first one of a frame; as query_ns";
     "worst_frame_ns", "ns", Of::WorstFrame, "slowest frame: median over processes of the median of each frame over rounds, then the maximum over the frames, times frame_ns / the mean over the frames; absent below three readings per frame, where an interruption would be the worst frame";

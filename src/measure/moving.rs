@@ -99,20 +99,16 @@ impl<'w> Frames<'w> {
         query: usize,
         out: &[ItemId],
     ) -> Result<(), Verdict> {
-        let is_exact = moving.fat.is_none();
-        if is_exact && self.right.get(query) == Some(&Answer::of(out)) {
+        if self.right.get(query) == Some(&Answer::of(out)) {
             return Ok(());
         }
         let (views, per_frame) = (&self.workload.views, self.workload.views_per_frame);
         let camera = query % views.len();
         let view = views[camera].as_any();
         let place = format!("frame {}, camera {camera}", query / per_frame + 1);
-        compare_with_scan(moving.held(), view, &place, |ids| ids.extend(out))?;
+        compare_with_scan(&moving.items, view, &place, |ids| ids.extend(out))?;
         let reason = format!("{place}: another set than in the first process of the run");
-        match is_exact {
-            true => Err(Verdict::new(Status::Wrong, reason)),
-            false => Ok(()),
-        }
+        Err(Verdict::new(Status::Wrong, reason))
     }
 }
 
@@ -124,8 +120,6 @@ pub(super) struct Moving<'w> {
     /// Bounds as the culling test has them indexed.
     items: Vec<Aabb>,
     moved: Vec<ItemId>,
-    /// Enlarged bounds that the index holds in place of the items'.
-    fat: Option<Fat>,
     frame: u32,
     /// Number of updates that were new builds because the structure refused a refit.
     pub(super) refused: usize,
@@ -136,18 +130,12 @@ impl<'w> Moving<'w> {
     pub(super) fn build(frames: &Frames<'w>, spec: &'w StructureSpec) -> Result<Self, Verdict> {
         let (workload, motion) = (frames.workload, frames.motion);
         let items = workload.items.to_vec();
-        let fat = match spec.policy {
-            UpdatePolicy::Fat(margin) => Some(Fat::of(&items, margin as f32)),
-            _ => None,
-        };
-        let held = fat.as_ref().map_or(&items, |fat| &fat.boxes);
-        let mut index = spec.build(workload.input(held))?;
+        let mut index = spec.build(workload.input(&items))?;
         if spec.info().refits && spec.policy != UpdatePolicy::Rebuild {
             // Tables of positions are no part of the first frame.
-            index.refit(held, &[]);
+            index.refit(&items, &[]);
         }
         Ok(Moving {
-            fat,
             frame: 0,
             refused: 0,
             workload,
@@ -175,7 +163,7 @@ impl<'w> Moving<'w> {
         let is_rebuilt = match self.spec.policy {
             UpdatePolicy::Rebuild => true,
             UpdatePolicy::Every(frames) => self.frame.is_multiple_of(frames),
-            _ => false,
+            UpdatePolicy::Refit => false,
         };
         if is_rebuilt {
             let refits_later = self.spec.policy != UpdatePolicy::Rebuild;
@@ -183,24 +171,12 @@ impl<'w> Moving<'w> {
             self.index = self.spec.build(input)?;
             return Ok(());
         }
-        let (items, moved) = match &mut self.fat {
-            None => (&self.items, &self.moved),
-            Some(fat) => {
-                fat.take(&self.items, &self.moved);
-                (&fat.boxes, &fat.left)
-            }
-        };
-        if !moved.is_empty() {
-            let input = self.workload.input(items);
-            let is_refitted = self.spec.update(&mut self.index, input, moved)?;
+        if !self.moved.is_empty() {
+            let input = self.workload.input(&self.items);
+            let is_refitted = self.spec.update(&mut self.index, input, &self.moved)?;
             self.refused += usize::from(!is_refitted);
         }
         Ok(())
-    }
-
-    /// The boxes that the index holds.
-    fn held(&self) -> &[Aabb] {
-        self.fat.as_ref().map_or(&self.items, |fat| &fat.boxes)
     }
 }
 
@@ -216,46 +192,6 @@ fn advance<'r>(
         items[id as usize] = *b;
     }
     Some(ids)
-}
-
-/// Enlarged bounds, and the items that have left theirs.
-struct Fat {
-    /// Margin on each side, in edge lengths.
-    margin: f32,
-    boxes: Vec<Aabb>,
-    left: Vec<ItemId>,
-}
-
-impl Fat {
-    fn of(items: &[Aabb], margin: f32) -> Fat {
-        Fat {
-            margin,
-            boxes: items.iter().map(|b| enlarged(b, margin)).collect(),
-            left: Vec::new(),
-        }
-    }
-
-    /// Enlarges the bounds of the movers that have left theirs.
-    fn take(&mut self, items: &[Aabb], moved: &[ItemId]) {
-        self.left.clear();
-        for &id in moved {
-            let (b, held) = (&items[id as usize], &mut self.boxes[id as usize]);
-            if b.is_empty() != held.is_empty() || !(b.is_empty() || held.contains(b)) {
-                *held = enlarged(b, self.margin);
-                self.left.push(id);
-            }
-        }
-    }
-}
-
-/// A box with a margin in edge lengths on each side; an empty one as it is.
-fn enlarged(b: &Aabb, margin: f32) -> Aabb {
-    if b.is_empty() {
-        return *b;
-    }
-    let by = b.extent() * margin;
-    let larger = Aabb::new((b.min - by).min(b.min), (b.max + by).max(b.max));
-    if larger.is_finite() { larger } else { *b }
 }
 
 /// Update, first query and further queries of a frame.
@@ -346,7 +282,7 @@ pub(super) fn ageing(
         }
         if AGES.contains(&frame) {
             let aged = moving.index.as_ref();
-            let found = over_fresh(aged, spec, frames.workload, moving.held(), protocol)?;
+            let found = over_fresh(aged, spec, frames.workload, &moving.items, protocol)?;
             ages.extend(found.map(|ln| (frame, ln)));
         }
     }

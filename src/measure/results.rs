@@ -177,9 +177,7 @@ impl<'p> MergedParts<'p> {
         let verdict = self.verdict(label);
         let is_right = verdict.is_ok();
         let is_answered = is_right || verdict.status == Status::Unsafe;
-        // Errors are of the scan's answers, which fat bounds do not give.
-        let is_fat = subject.is_some_and(|s| s.counts.contains_key("fat_excess"));
-        let judged = subject.and(first.judged).filter(|_| is_answered && !is_fat);
+        let judged = subject.and(first.judged).filter(|_| is_answered);
         let bare = |why: String| why.trim_start_matches("panicked: ").to_owned();
         let left_out = subject.filter(|_| is_right).map(|_| self.left_out(label));
         ReportCell {
@@ -302,8 +300,7 @@ impl<'p> MergedParts<'p> {
             Of::Time(task) => self.ns(label, task),
             Of::TimePerVisible => {
                 let ns = self.ns(label, TaskKind::Query)?;
-                let excess = counted("fat_excess").map_or(0.0, |excess| excess.value);
-                Some(ns.per(self.visible_when_timed()? * (1.0 + excess)))
+                Some(ns.per(self.visible_when_timed()?))
             }
             Of::Wall(task) => {
                 let tasks = self.tasks(label, task);
@@ -396,9 +393,6 @@ impl<'p> MergedParts<'p> {
     fn ranks(&self, cells: &[ReportCell]) -> Vec<(usize, usize)> {
         let ok = cells.iter().enumerate();
         let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);
-        // Fat bounds answer another question: no rank beside exact ones.
-        let is_exact = |cell: &ReportCell| cell.value("fat_excess").unwrap_or(0.0) == 0.0;
-        let ok = ok.filter(|(_, c)| is_exact(c));
         let timed = ok.filter_map(|(i, cell)| {
             let [reference, own] = self.paired(&cell.structure, self.ranked())?;
             let relative = own.iter().zip(reference).map(|(own, r)| own - r);

@@ -2,8 +2,6 @@
 
 use std::fs;
 
-use serde_json::Value;
-
 use super::process::*;
 use super::runs::{cells, report};
 use super::{BOXES, EYE_LOOK};
@@ -377,56 +375,27 @@ fn motions_that_cannot_be_measured_are_refused() {
     }
 }
 
-/// Bounds that are enlarged return more than the scan, which is not said to agree.
 #[test]
-fn fat_bounds_are_not_said_to_return_the_sets_of_the_scan() {
+fn figures_follow_the_samples_and_rebuilds_that_do_not_come_are_told() {
     let folder = folder(&[]);
     let line = "run --scene city:n=300 --path orbit:frames=4 --structure linear,wide --no-bounds \
-                --motion drift:share=0.5,frames=6 --processes 1 --update";
-    for (update, says) in [("fat=1", false), ("refit,fat=1", true)] {
-        let told = format!("{line} {update} --out {says}");
-        let told = unwrapped(&works(folder.path(), &told));
-        let at = folder.path().join(says.to_string());
-        assert_eq!(
-            told.contains("All structures with exact bounds returned"),
-            says,
-            "{told}"
-        );
-        assert!(told.contains("fat bounds return more"), "{told}");
-        let whole = json(&fs::read_to_string(at.join("report.json")).expect("there"));
-        let value = |cell: &Value, name: &str| cell["metrics"][name]["value"].as_f64();
-        let all = cells(&whole)
-            .iter()
-            .filter(|cell| value(cell, "fat_excess").is_some());
-        for cell in all.clone() {
-            let name = cell["structure"].as_str().expect("a name");
-            let samples = fs::read_to_string(at.join("samples.csv")).expect("there");
-            let frames = rows(&samples).into_iter().filter(|row| {
-                row["structure"] == name && row["task"] == "frame" && row["round"] == "0"
-            });
-            let returned: Vec<f64> = frames.map(|row| row["returned"].parse().unwrap()).collect();
-            let mean = returned.iter().sum::<f64>() / returned.len() as f64;
-            assert_eq!(value(cell, "visible_count"), Some(mean), "{cell}");
-            let per = value(cell, "query_ns").unwrap() / mean;
-            let found = value(cell, "ns_per_visible").unwrap();
-            assert!((found / per - 1.0).abs() < 1e-9, "{cell}");
-            assert!(value(cell, "fat_excess") > Some(0.0));
-        }
-        assert!(all.count() > 0);
-        assert_eq!(
-            told.contains("no structure with exact bounds"),
-            !says,
-            "{told}"
-        );
-    }
-    let told = unwrapped(&works(
-        folder.path(),
-        &format!("{line} every=50,fat=1 --path spin:frames=4"),
-    ));
-    for part in [
-        "fat bounds return more",
-        "@every=50: no rebuild in 6 frames",
-    ] {
-        assert!(told.contains(part), "{told}");
+                --motion drift:share=0.5,frames=6 --processes 1 --update refit,every=50 --out r";
+    let told = unwrapped(&works(folder.path(), line));
+    let late = "@every=50: no rebuild in 6 frames";
+    assert!(told.contains(late), "{told}");
+    let read = |name| fs::read_to_string(folder.path().join("r").join(name)).expect("there");
+    let (whole, samples) = (json(&read("report.json")), rows(&read("samples.csv")));
+    for cell in cells(&whole) {
+        let value = |name: &str| cell["metrics"][name]["value"].as_f64();
+        let name = cell["structure"].as_str().expect("a name");
+        let frames = samples.iter().filter(|row| {
+            row["structure"] == name && row["task"] == "frame" && row["round"] == "0"
+        });
+        let returned: Vec<f64> = frames.map(|row| row["returned"].parse().unwrap()).collect();
+        let mean = returned.iter().sum::<f64>() / returned.len() as f64;
+        assert_eq!(value("visible_count"), Some(mean), "{cell}");
+        let per = value("query_ns").unwrap() / mean;
+        let found = value("ns_per_visible").unwrap();
+        assert!((found / per - 1.0).abs() < 1e-9, "{cell}");
     }
 }

@@ -229,20 +229,17 @@ fn an_update_that_loses_an_item_is_no_right_answer() {
 }
 
 #[test]
-fn policies_are_right_and_fat_bounds_say_what_they_cost() {
-    let labels = ["wide@refit", "wide@rebuild", "wide@every=5", "wide@fat=0.5"];
+fn all_policies_are_right() {
+    let labels = ["wide@refit", "wide@rebuild", "wide@every=5"];
     let specs = labels.map(by_policy);
     for motion in ["drift:share=0.3,frames=20", "spawn:share=0.3,frames=20"] {
         let part = part(&specs, motion, CullingTest::SixPlane, None);
         let cells = Group::of(&[part]).cells;
-        let extra = |n: usize| cells[n].value("fat_excess");
         assert!(
             cells.iter().all(|cell| cell.status == Status::Ok),
             "{cells:?}"
         );
-        assert!(cells[..3].iter().all(|cell| cell.rank.is_some()));
-        assert_eq!((extra(0), cells[3].rank), (None, None));
-        assert!(extra(3) > Some(0.0));
+        assert!(cells.iter().all(|cell| cell.rank.is_some()));
         // The tenth frame of every=5 has a new build.
         let aged = |n: usize, frame| cells[n].value(&format!("ageing_{frame}")).is_some();
         assert_eq!([0, 1, 2].map(|n| aged(n, 10)), [true, false, false]);
