@@ -173,9 +173,6 @@ pub struct MergeArgs {
     /// A new folder for the page, the report, the samples and the stream
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Join the given shards although other parts of the plan are missing
-    #[arg(long)]
-    pub partial: bool,
 }
 
 #[derive(Args, Debug)]

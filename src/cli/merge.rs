@@ -6,7 +6,7 @@ use super::args::MergeArgs;
 use super::document::show;
 use super::report::{close, shown, write_page};
 use super::run_resume::{command_line, same_recorded};
-use super::{Ending, expect_folder, interrupt, tell, text, unread_is_fine};
+use super::{Ending, expect_folder, interrupt, text, unread_is_fine};
 use crate::report::{merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
@@ -19,13 +19,10 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         same_recorded(first, &other).with_context(|| path.display().to_string())?;
     }
     let kept = without_place(&first.unwrap_or_default());
-    let merged = join(&args.runs, (&kept, &command_line(&kept)), args.partial)?;
+    let merged = join(&args.runs, (&kept, &command_line(&kept)))?;
     interrupt::from_now_on_finish();
     if !merged.write(&args.out, &interrupt::asked)? {
         return Ok(Ending::Interrupted);
-    }
-    if !merged.missing.is_empty() {
-        tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
     write_page(&report, &args.out, Vec::new())?;

@@ -19,8 +19,6 @@ use crate::shown::first_of;
 pub struct Merged {
     /// The stream of the whole run.
     pub stream: Stream,
-    /// The groups of the plan that no shard has.
-    pub missing: Vec<GroupKey>,
     /// Per part: the file of its samples, and their range in bytes.
     samples: Vec<(PathBuf, [u64; 2])>,
 }
@@ -30,12 +28,8 @@ pub struct Merged {
 ///
 /// # Errors
 /// No shard or an unfinished one; another seed, suite, structure, machine, build or
-/// source; a cell in two shards; without `partial` a group in none.
-pub fn merge(
-    folders: &[PathBuf],
-    line: (&[String], &str),
-    partial: bool,
-) -> Result<Merged, InputError> {
+/// source; a cell in two shards, a group in none.
+pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, InputError> {
     let mut shards = Vec::new();
     for path in folders {
         let (stream, _) = read_stream(&path.join(STREAM))?;
@@ -61,13 +55,13 @@ pub fn merge(
             return Err(writing::at(path, reason));
         }
     }
-    let whole = begin.header.whole().to_vec();
+    let whole = begin.header.whole();
     let has = |key: &GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
-    let (groups, missing): (Vec<_>, Vec<_>) = whole.iter().cloned().partition(has);
-    if !missing.is_empty() && !partial {
+    let missing = pairs(whole.iter().filter(|key| !has(key)));
+    if !missing.is_empty() {
+        let missing = first_of(&missing, NAMED);
         return Err(InputError::new(format!(
-            "no shard has {}; expected all of the plan (--partial joins what is there)",
-            first_of(&pairs(&missing), NAMED)
+            "no shard has {missing}; expected all of the plan"
         )));
     }
     let mut parts = Vec::new();
@@ -102,21 +96,15 @@ pub fn merge(
     let streams: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
     Ok(Merged {
         stream: Stream {
-            header: joined(&streams, line, groups),
+            header: joined(&streams, line),
             parts: kept,
             finished_at: streams.iter().filter_map(|s| s.finished_at.clone()).max(),
         },
-        missing,
         samples,
     })
 }
 
 impl Merged {
-    /// The scenes and paths that no shard has, a few of them by name.
-    pub fn missing_named(&self) -> String {
-        first_of(&pairs(&self.missing), NAMED)
-    }
-
     /// Writes the four files of a run into a folder that is new or empty.
     ///
     /// They are written beside it and renamed, into an empty folder the stream last, so that
@@ -225,7 +213,7 @@ fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<Strin
 const NAMED: usize = 4;
 
 /// The header of the run that the shards are together.
-fn joined(shards: &[&Stream], (args, command): (&[String], &str), groups: Vec<GroupKey>) -> Header {
+fn joined(shards: &[&Stream], (args, command): (&[String], &str)) -> Header {
     let headers = || shards.iter().map(|stream| &stream.header);
     let mut header = shards[0].header.clone();
     let loads = headers().filter_map(|h| h.machine.load);
@@ -235,11 +223,8 @@ fn joined(shards: &[&Stream], (args, command): (&[String], &str), groups: Vec<Gr
     header.run.id = format!("{}-of-{}", header.run.id, shards.len());
     header.run.command = command.to_owned();
     header.args = args.to_vec();
-    let whole = header.whole().to_vec();
-    let shards: Vec<&str> = headers().filter_map(|h| h.run.shard.as_deref()).collect();
-    let is_partial = groups.len() < whole.len();
-    header.run.shard = is_partial.then(|| shards.join("+"));
-    header.whole = if is_partial { whole } else { Vec::new() };
-    header.groups = groups;
+    header.run.shard = None;
+    header.groups = header.whole().to_vec();
+    header.whole.clear();
     header
 }

@@ -126,7 +126,7 @@ fn shards_together_are_the_run_of_the_whole_plan() {
 }
 
 #[test]
-fn a_part_of_the_shards_is_joined_on_request_only() {
+fn missing_shards_are_named() {
     let folder = folder(&[]);
     for i in [1, 3, 4] {
         works(
@@ -134,30 +134,8 @@ fn a_part_of_the_shards_is_joined_on_request_only() {
             &format!("{PLAN} --shard {i}/4 --out part{i}"),
         );
     }
-    let missing = "no shard has city:n=300 along spin:frames=4 | --partial";
+    let missing = "no shard has city:n=300 along spin:frames=4 | expected all of the plan";
     all_refused(&folder, &["merge part1 part3 part4 --out merged"], missing);
-    let done = cullbench(
-        folder.path(),
-        "merge part1 part3 part4 --partial --out some",
-    );
-    assert_eq!(done.code, Some(0), "{done:?}");
-    assert_eq!(
-        done.err,
-        "note: no shard has city:n=300 along spin:frames=4\n"
-    );
-    let lacks = "; shard 1/4+3/4+4/4; not measured: city:n=300 along spin:frames=4";
-    assert!(unwrapped(&done.out).contains(lacks), "{}", done.out);
-    let page = fs::read_to_string(folder.path().join("some/report.html")).expect("a page");
-    assert!(page.contains(&format!("6 cells, all ok{lacks}.")), "{page}");
-    let some = report(&folder.path().join("some"));
-    assert_eq!(cells(&some).len(), 6);
-    assert_eq!(some["run"]["shard"], "1/4+3/4+4/4");
-    // What was joined so far can be joined further.
-    works(folder.path(), &format!("{PLAN} --shard 2/4 --out part2"));
-    works(folder.path(), "merge part2 some --out all");
-    works(folder.path(), &format!("{PLAN} --out whole"));
-    let at = |name: &str| folder.path().join(name);
-    assert_eq!(answers(&at("all")), answers(&at("whole")));
 }
 
 /// Changes the first line of a stream.
