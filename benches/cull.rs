@@ -12,7 +12,7 @@ use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
 use cullbench::index::{Input, Registry, StructureSpec};
 use cullbench::kernel::Plain;
-use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
+use cullbench::measure::{Workload, move_share};
 use cullbench::path;
 use cullbench::scene::{self, Scene};
 
@@ -107,7 +107,7 @@ fn update(c: &mut Criterion) {
         let scene = load(source);
         for row in Registry::builtin().rows() {
             let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
-            for share in UPDATE_SHARES {
+            for share in [0.001, 0.01, 0.1, 1.0] {
                 let mut items = scene.items.clone();
                 let moved = move_share(&mut items, share);
                 let name = format!("{source}/{}%", share * 100.0);

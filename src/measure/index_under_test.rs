@@ -37,9 +37,8 @@ pub struct Built {
     pub build_ms: f64,
     /// Memory of the index over the items.
     pub memory: MemoryUsage,
-    /// CPU time of an update, ms, for each of [`super::UPDATE_SHARES`]; empty for
-    /// scenes too large to be moved in passing.
-    pub update_ms: Vec<f64>,
+    /// CPU time of an update, ms; `None` in scenes too large to be moved in passing.
+    pub update_ms: Option<f64>,
 }
 
 impl Built {
@@ -100,8 +99,8 @@ impl Subject {
     /// Measures updates as well, on another index that is then thrown away.
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         if let Ok(built) = &mut self.built {
-            let updates = || measure_updates(&self.spec, scene, test);
-            match guarded(updates).unwrap_or_else(Err) {
+            let update = || measure_update(&self.spec, scene, test);
+            match guarded(update).unwrap_or_else(Err) {
                 Ok(update_ms) => built.update_ms = update_ms,
                 Err(verdict) => self.built = Err(verdict),
             }
@@ -141,48 +140,43 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     Ok(Built {
         memory: index.memory(),
         build_ms,
-        update_ms: Vec::new(),
+        update_ms: None,
         items: index,
         regions: regions.transpose()?,
     })
 }
 
-/// Shares of the items that move in the updates that are measured.
-pub const UPDATE_SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
-/// Share of the items that move in an untimed update.
-const USUAL_SHARE: f64 = 0.01;
+/// Share of the items that move in the update that is measured.
+const UPDATE_SHARE: f64 = 0.01;
 /// Largest scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 
-/// Times an update for each of [`UPDATE_SHARES`], CPU ms.
+/// Times an update after [`UPDATE_SHARE`] of the items have moved by their own size, CPU ms.
 ///
-/// Each update moves a share of the items by their own size. The first one, which touches
-/// memory for the first time, is not timed. A search after the last one is checked.
-pub(super) fn measure_updates(
+/// The first of two counts as little as the first build does. A search after them is checked.
+fn measure_update(
     spec: &StructureSpec,
     scene: &Scene,
     test: CullingTest,
-) -> Result<Vec<f64>, Verdict> {
+) -> Result<Option<f64>, Verdict> {
     let mut items = test.items(&scene.items).into_owned();
     if items.is_empty() || items.len() > MOST_UPDATED {
-        return Ok(Vec::new());
+        return Ok(None);
     }
     let mut index = spec.build(input_for(test, scene, &items))?;
-    let mut times = Vec::with_capacity(UPDATE_SHARES.len());
-    let first = move_share(&mut items, USUAL_SHARE);
-    spec.update(&mut index, input_for(test, scene, &items), &first)?;
-    for share in UPDATE_SHARES {
-        let moved = move_share(&mut items, share);
+    let mut update_ms = None;
+    for _ in 0..2 {
+        let moved = move_share(&mut items, UPDATE_SHARE);
         let watch = Stopwatch::start_for(spec.is_threaded());
         spec.update(&mut index, input_for(test, scene, &items), &moved)?;
-        times.push(watch.lap().cpu_ns / 1e6);
+        update_ms = Some(watch.lap().cpu_ns / 1e6);
     }
     if let Some(moved) = items.iter().find(|b| !b.is_empty()) {
         let point = AnyVolume::Point(moved.min);
         let answer = |out: &mut Vec<ItemId>| index.query(point, out);
         compare_with_scan(&items, point, "a search after updates", answer)?;
     }
-    Ok(times)
+    Ok(update_ms)
 }
 
 /// Moves evenly spread items by their own extent, within f32; returns their ids.

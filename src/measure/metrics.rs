@@ -88,10 +88,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "undecided_count", "items", Of::Judged(|j| per_query(j, j.errors.undecided)), "too close to decide (counted as boundary contacts), per checked query, mean";
     "judged_queries", "queries", Of::Judged(|j| Some(Estimate::exact(j.judged_queries as f64))), "cameras of the path whose answers were checked against the oracle";
     "build_ms", "ms", Of::Process(|s| s.build_ms), "CPU time of one build; wall time with --threads above 1";
-    "update_ms_0_1_percent", "ms", Of::Process(|s| s.update_ms.first().copied()), "as update_ms, after 0.1 % have moved";
-    "update_ms", "ms", Of::Process(|s| s.update_ms.get(1).copied()), "CPU time of an update after 1 % of the items, at least one, have moved (scenes of up to 2 million)";
-    "update_ms_10_percent", "ms", Of::Process(|s| s.update_ms.get(2).copied()), "as update_ms, after 10 % have moved";
-    "update_ms_100_percent", "ms", Of::Process(|s| s.update_ms.get(3).copied()), "as update_ms, after all have moved";
+    "update_ms", "ms", Of::Process(|s| s.update_cpu_ms), "CPU time of an update after 1 % of the items, at least one, have moved (scenes of up to 2 million)";
     "memory_bytes_per_item", "bytes", Of::Bytes(|s| s.memory_bytes), "nodes, item bounds and ids / items";
     "break_even_queries", "queries", Of::BreakEven, "queries after which the build is repaid against linear; 0: at once; empty: never, or not shown to be faster";
     "growth_exponent", "1", Of::Report, "slope of ln query_ns over ln items: 0 does not grow, 1 as a scan does; least squares over three or more sizes of a world with about as many visible items on the same kind of path; absent below three";

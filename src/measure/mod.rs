@@ -71,7 +71,7 @@ pub use experiment::{
 };
 pub use frames::measure;
 pub use group::{GroupPlan, NO_ITEMS};
-pub use index_under_test::{Built, Subject, UPDATE_SHARES, move_share};
+pub use index_under_test::{Built, Subject, move_share};
 pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
 pub use metrics::{METRICS, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};

@@ -64,8 +64,8 @@ pub struct SubjectPart {
     pub build_ms: Option<f64>,
     /// Bytes of nodes and items; `None` where nothing was built.
     pub memory_bytes: Option<u64>,
-    /// CPU time of each update, ms, in the order of [`super::UPDATE_SHARES`].
-    pub update_ms: Vec<f64>,
+    /// CPU time of an update, ms; `None` where none was measured.
+    pub update_cpu_ms: Option<f64>,
     /// Bytes after the last frame of a motion; the first process only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory_after_bytes: Option<u64>,
@@ -139,7 +139,7 @@ impl SubjectPart {
         };
         part.build_ms = Some(built.build_ms);
         part.memory_bytes = Some(built.memory.total() as u64);
-        part.update_ms.clone_from(&built.update_ms);
+        part.update_cpu_ms = built.update_ms;
         match guarded(|| built.items.chose()) {
             Ok(chose) => part.chose = chose,
             Err(verdict) => part.verdict = verdict,
@@ -157,7 +157,7 @@ impl SubjectPart {
             verdict,
             build_ms: None,
             memory_bytes: None,
-            update_ms: Vec::new(),
+            update_cpu_ms: None,
             memory_after_bytes: None,
             ageing_ln: BTreeMap::new(),
             counts: BTreeMap::new(),

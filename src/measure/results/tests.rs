@@ -23,7 +23,7 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
         verdict: Verdict::default(),
         build_ms: Some(build_ms),
         memory_bytes: Some(4000),
-        update_ms: Vec::new(),
+        update_cpu_ms: None,
         memory_after_bytes: None,
         ageing_ln: BTreeMap::new(),
         counts: BTreeMap::new(),
