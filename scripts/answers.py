@@ -39,8 +39,6 @@ TIMED = {"dominated_by", "is_tie", "on_front", "twin", "as_fast", "reason", "rat
 TIMED_ENDS = ("_ns", "_ns_lower", "_ns_upper", "ratio_lower", "ratio_upper", "us_per_second",
               "us_per_second_lower", "us_per_second_upper", "ns_per_step", "ns_per_step_lower",
               "ns_per_step_upper", "ns_per_item", "ns_per_ray", "ns_per_decided", "ns_per_removed")
-# A quantile of Student's t, whose last digit changes with the code around it.
-ROUNDED = {"elsewhere"}
 program = ""
 
 
@@ -54,8 +52,7 @@ def output(*arguments, codes=(0,)):
 def untimed(value):
     if isinstance(value, dict):
         # A field without a value is no answer.
-        return {name: untimed(inner) if name not in ROUNDED else float(f"{inner:.12g}")
-                for name, inner in value.items()
+        return {name: untimed(inner) for name, inner in value.items()
                 if inner is not None and name not in TIMED and not name.endswith(TIMED_ENDS)}
     return [untimed(inner) for inner in value] if isinstance(value, list) else value
 

@@ -230,7 +230,6 @@ mod tests {
                 value: misses as f64,
                 lower: None,
                 upper: Some(bound + 9.0 * misses as f64),
-                elsewhere: None,
             });
         }
         let (_, told) = swept_errors(&rows.iter().collect::<Vec<_>>());

@@ -10,8 +10,6 @@ use super::student;
 
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
-/// Level at which [`Rate::elsewhere`] holds.
-const ELSEWHERE: f64 = 0.99999;
 /// Nothing seen in n: below 3/n at 95 %, because 0.95 = 1 - exp(-3).
 const NOTHING_SEEN: f64 = 3.0;
 
@@ -24,16 +22,12 @@ pub struct Rate {
     pub lower: Option<f64>,
     /// Upper end of the interval.
     pub upper: Option<f64>,
-    /// How far another sample of as many clusters may be from `value`: both are
-    /// samples, and 99.999 % of all pairs come nearer. Null from one cluster.
-    pub elsewhere: Option<f64>,
 }
 
 impl Rate {
     /// The same for units of which each has one event at most.
     pub fn of_share(mut self) -> Rate {
         self.upper = self.upper.map(|x| x.min(1.0));
-        self.elsewhere = self.elsewhere.map(|x| x.min(1.0));
         self
     }
 
@@ -44,7 +38,6 @@ impl Rate {
             value: self.value * units,
             lower: times(self.lower),
             upper: times(self.upper),
-            elsewhere: times(self.elsewhere),
         }
     }
 }
@@ -66,12 +59,6 @@ pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Rate> {
 /// 249, p. 1743), and it is never nearer than that: units count as independent
 /// there, since nothing says otherwise.
 ///
-/// Two samples of the same rate differ by `d` with `d^2 < z^2 (s^2 + s'^2)`. The
-/// other's variance is `s^2 + d w` if all it has more are events of weight `w`, and
-/// what solves that, `d = (z^2 w + sqrt(z^4 w^2 + 8 z^2 s^2)) / 2`, is `elsewhere`:
-/// for many events the usual sqrt(2) standard errors by `z`, for none `z^2`
-/// events.
-///
 /// ```
 /// use cullbench::statistics::rate;
 /// let found = rate(&[[2.0, 100.0], [4.0, 100.0], [3.0, 100.0]]).unwrap();
@@ -89,19 +76,13 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
     let count = clusters.len() as f64;
     let residuals = clusters.iter().map(|[y, x]| (y - value * x).powi(2));
     let error = (count / (count - 1.0) * residuals.sum::<f64>()).sqrt() / units;
-    let margin = |level: f64| student::quantile(0.5 + level / 2.0, count - 1.0) * error;
+    let margin = student::quantile(0.5 + LEVEL / 2.0, count - 1.0) * error;
     let least = NOTHING_SEEN / units;
-    // The weight of one event: as many as come together weigh one.
-    let together = (error * units).powi(2) / events.max(1.0);
-    let square = student::quantile(0.5 + ELSEWHERE / 2.0, count - 1.0).powi(2);
-    let one = square * together.max(1.0) / units;
-    let elsewhere = (one + (one * one + 8.0 * square * error * error).sqrt()) / 2.0;
     let several = |x: f64| (clusters.len() > 1).then_some(x);
     Some(Rate {
         value,
-        lower: several((value - margin(LEVEL)).max(0.0)),
-        upper: several(value + margin(LEVEL).max(least)),
-        elsewhere: several(elsewhere),
+        lower: several((value - margin).max(0.0)),
+        upper: several(value + margin.max(least)),
     })
 }
 
@@ -145,15 +126,12 @@ mod tests {
         assert_eq!(rate(&[[1.0, 0.0], [0.0, 0.0]]), None);
         assert_eq!(rate(&[]), None);
         let share = rate(&[[0.0, 4.0], [3.0, 4.0]]).unwrap().of_share();
-        assert_eq!((share.upper, share.elsewhere), (Some(1.0), Some(1.0)));
+        assert_eq!(share.upper, Some(1.0));
         // Nothing seen, and clusters that are all alike: never nearer than 3/n.
         for events in [0.0, 1.0] {
             let alike = rate(&[[events, 10.0]; 30]).unwrap();
             assert_eq!(alike.upper, Some(alike.value + 3.0 / 300.0), "{events}");
         }
-        // Of many clusters none with an event: z^2 / n, z = 4.42.
-        let elsewhere = rate(&[[0.0, 1e3]; 5000]).unwrap().elsewhere.unwrap();
-        assert!((elsewhere * 5e6 - 19.5).abs() < 0.1, "{elsewhere}");
     }
 
     /// Cameras with rates of their own, as frusta of other directions have them.
@@ -169,29 +147,13 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_truth_and_other_samples() {
+    fn intervals_hold_the_truth() {
         let rates: Vec<Rate> = (0..2000)
             .map(|seed| rate(&sample(seed, 30)).unwrap())
             .collect();
         let holds = |r: &&Rate| r.lower.unwrap() <= 0.3 && 0.3 <= r.upper.unwrap();
         let held = rates.iter().filter(holds).count();
         assert!((1860..=1940).contains(&held), "{held} of 2000");
-        let none_apart = |rates: &[Rate]| {
-            let off = |pair: &[Rate]| (pair[0].value - pair[1].value).abs();
-            let pairs = rates.chunks(2);
-            pairs
-                .map(|pair| off(pair) / pair[0].elsewhere.unwrap())
-                .fold(0.0, f64::max)
-                <= 1.0
-        };
-        assert!(none_apart(&rates));
-        // Rare ones as well: two in all, on the mean.
-        let mut random = Pcg64::seed_from_u64(7);
-        let mut rare = || [f64::from(u8::from(random.random::<f64>() < 0.02)), 50.0];
-        let rare: Vec<Rate> = (0..2000)
-            .map(|_| rate(&(0..100).map(|_| rare()).collect::<Vec<_>>()).unwrap())
-            .collect();
-        assert!(none_apart(&rare));
     }
 
     #[test]

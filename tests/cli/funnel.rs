@@ -152,8 +152,7 @@ fn fields(row: &Value, before: &str, found: &mut Vec<(String, String)>) {
             (before, name) => format!("{before}_{name}"),
         };
         match value {
-            // Sentences, and how far another sample may be.
-            _ if name == "summary" || name.ends_with("_elsewhere") => {}
+            _ if name == "summary" => {}
             Value::Null => {}
             Value::Object(_) => fields(value, &name, found),
             Value::String(text) => found.push((name, text.clone())),

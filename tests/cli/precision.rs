@@ -71,7 +71,7 @@ fn json_has_the_documented_fields() {
     let swept = format!(
         "sweep value test planes arithmetic epsilon false_negative_ppm excess {errors} refused"
     );
-    let rate = "value lower upper elsewhere";
+    let rate = "value lower upper";
     for (name, fields) in [("points", point.as_str()), ("sweeps", swept.as_str())] {
         assert!(!array(outcome, name).is_empty(), "{name}");
         for row in array(outcome, name) {
