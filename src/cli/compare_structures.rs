@@ -1,7 +1,6 @@
 //! Answers of one structure after another (a large scene does not fit in memory
 //! several times), as `query` and `locate` compare and write them.
 
-use std::cell::LazyCell;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
 
@@ -50,9 +49,8 @@ const HELD: usize = 64 << 20;
 
 /// Answers every question by every structure.
 ///
-/// False if two structures disagree, or an id is no item's.
-/// One structure is not compared with the reference scan, which takes far longer; where two
-/// disagree, the one that agrees with the scan is named.
+/// False if two structures disagree, or an id is no item's. Nothing is compared with the
+/// reference scan, which takes far longer.
 ///
 /// `each` receives the answers in the order of questions, then of structures, in blocks of
 /// [`HELD`] bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
@@ -71,15 +69,6 @@ pub fn ask_all(
     let room = available_bytes().map_or(HELD, |free| HELD.min(free as usize / 8));
     // A single structure is built once; of several there may be memory for one.
     let mut only: Option<Box<dyn DynIndex>> = None;
-    let scan = LazyCell::new(|| {
-        let scan = StructureSpec::parse("linear-scalar").ok()?;
-        scan.build(input_of(scene, boxes)).ok()
-    });
-    let right = |question: usize| {
-        let (mut out, mut cost) = (Vec::new(), QueryCost::default());
-        ask(scan.as_ref()?.as_ref(), question, &mut out, &mut cost);
-        Some(Answer::of(&out))
-    };
     while from < questions {
         let mut answers: Vec<Vec<Row>> = Vec::new();
         for spec in structures {
@@ -141,16 +130,15 @@ pub fn ask_all(
         }
         from += answers.len();
         let rows: Vec<Row> = answers.into_iter().flatten().collect();
-        agree &= all_agree(&rows, what, right);
+        agree &= all_agree(&rows, what);
         each(rows)?;
     }
     Ok(agree)
 }
 
-/// Reports ids that are no item's, and questions with different answers.
-///
-/// `right` is the reference scan's answer to a question. True if there is nothing to report.
-fn all_agree(rows: &[Row], what: &str, right: impl Fn(usize) -> Option<Answer>) -> bool {
+/// Reports ids that are no item's, and questions with different answers; true if there is
+/// nothing to report.
+fn all_agree(rows: &[Row], what: &str) -> bool {
     let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;
     for row in rows {
@@ -162,17 +150,13 @@ fn all_agree(rows: &[Row], what: &str, right: impl Fn(usize) -> Option<Answer>) 
         }
         if base.answer != row.answer {
             agree = false;
-            let is_right = right(row.question);
-            let mut both = [*base, row].into_iter();
-            let agreed = both.find(|row| Some(row.answer) == is_right);
             let is_alike = (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum);
             super::tell(&format!(
-                "error: {what} {}: {}, {}{}; the reference scan agrees with {}",
+                "error: {what} {}: {}, {}{}",
                 row.question,
                 base.told(),
                 row.told(),
-                ["", ", but other ids"][usize::from(is_alike)],
-                agreed.map_or("neither", |row| &row.structure)
+                ["", ", but other ids"][usize::from(is_alike)]
             ));
         }
     }
@@ -327,14 +311,13 @@ mod tests {
             cost: QueryCost::default(),
             stray: None,
         };
-        let right = |_| None;
-        assert!(all_agree(&[row(&[1, 4]), row(&[4, 1])], "camera", right));
-        assert!(!all_agree(&[row(&[1, 4]), row(&[2, 3])], "camera", right));
+        assert!(all_agree(&[row(&[1, 4]), row(&[4, 1])], "camera"));
+        assert!(!all_agree(&[row(&[1, 4]), row(&[2, 3])], "camera"));
         let stray = Row {
             stray: Some(4),
             ..row(&[1, 4])
         };
-        assert!(!all_agree(&[stray], "camera", right));
+        assert!(!all_agree(&[stray], "camera"));
     }
 
     #[test]
