@@ -12,7 +12,7 @@ use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::BuildError;
 use crate::measure::{OverProcesses, ReportCell};
-use crate::statistics::{Estimate, Rate, flat, rate_of, ratio};
+use crate::statistics::{Estimate, flat, rate_of, ratio};
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
@@ -138,9 +138,9 @@ pub struct TestRow {
     #[serde(flatten, serialize_with = "flat::query_ns")]
     pub query_ns: Option<Estimate>,
     /// False positives / visible items, by judged camera.
-    pub excess: Option<Rate>,
+    pub excess: Option<Estimate>,
     /// Visible items that were not returned, in millionths.
-    pub false_negative_ppm: Option<Rate>,
+    pub false_negative_ppm: Option<Estimate>,
     /// Mean of the judged cameras.
     pub false_positives_per_query: Option<f64>,
     /// A query and the drawing of what it lets through though it cannot be
@@ -181,7 +181,7 @@ impl TestChoice {
                 test: test.name(),
                 query_ns: query,
                 excess: rate_of(by_camera, |e| [e.false_positives, e.visible]),
-                false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
+                false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
                 false_positives_per_query: extra,
                 total_ns: query
                     .zip(extra)

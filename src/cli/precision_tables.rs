@@ -6,7 +6,7 @@ use super::table::{Column, Table};
 use super::text::{self, significant, some, time_plus_minus};
 use crate::precision::{Names, Point, Precision, SWEEPS, Sweep, SweepRow};
 use crate::report::grouped;
-use crate::statistics::Rate;
+use crate::statistics::Estimate;
 
 /// The Pareto front within `room` characters.
 ///
@@ -107,7 +107,7 @@ fn fastest(points: &[Point]) -> Vec<&Point> {
     found
 }
 
-pub fn percent(rate: Option<Rate>) -> String {
+pub fn percent(rate: Option<Estimate>) -> String {
     text::rate(rate, 100.0)
 }
 
@@ -226,7 +226,7 @@ mod tests {
                 false_negatives: misses,
                 ..Default::default()
             });
-            row.false_negative_ppm = Some(crate::statistics::Rate {
+            row.false_negative_ppm = Some(crate::statistics::Estimate {
                 value: misses as f64,
                 lower: None,
                 upper: Some(bound + 9.0 * misses as f64),

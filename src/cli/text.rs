@@ -6,7 +6,7 @@ use std::iter;
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, first_of, lines, message, plain, significant, time, unit};
-use crate::statistics::{Estimate, Rate};
+use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
 
 /// "698 items, 2 bad items left out".
@@ -117,16 +117,16 @@ pub fn time_within(ns: Estimate) -> String {
 pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     some(ns, |ns| {
         let (size, name) = unit(ns.value);
-        let ns = ns.per(size);
-        format!("{} {name}", with_ends(ns.value, [ns.lower, ns.upper]))
+        format!("{} {name}", with_ends(ns.per(size)))
     })
 }
 
 /// A value with a margin, or with its interval where an end is far.
-fn with_ends(value: f64, ends: [Option<f64>; 2]) -> String {
+fn with_ends(found: Estimate) -> String {
+    let value = found.value;
     let is_near = |end: f64| value == 0.0 || (end / value).ln().abs() < 0.5;
     let margin = |[lower, upper]: [f64; 2]| f64::max(value - lower, upper - value);
-    match ends[0].zip(ends[1]).map(<[f64; 2]>::from) {
+    match found.ends() {
         Some(ends) if !ends.into_iter().all(is_near) => {
             significant(value) + &interval(Some(ends), 1.0)
         }
@@ -180,10 +180,8 @@ pub fn time_with(metric: &Metric) -> String {
 }
 
 /// A rate per `units` with its 95 % interval; nothing if there is none.
-pub fn rate(rate: Option<Rate>, units: f64) -> String {
-    some(rate.map(|rate| rate.per(units)), |rate| {
-        with_ends(rate.value, [rate.lower, rate.upper])
-    })
+pub fn rate(rate: Option<Estimate>, units: f64) -> String {
+    some(rate.map(|rate| rate.times(units)), with_ends)
 }
 
 /// How many columns of a terminal a text takes: two for each character of Chinese.
@@ -275,8 +273,7 @@ pub fn basis(comparison: &Comparison) -> String {
 /// False positives of the truly visible items: "0.08±0.03 %".
 pub fn false_positives(comparison: &Comparison) -> Option<String> {
     let share = comparison.metric_of_any("excess")?.estimate().per(0.01);
-    let percent = with_ends(share.value, [share.lower, share.upper]);
-    Some(format!("{percent} %"))
+    Some(format!("{} %", with_ends(share)))
 }
 
 /// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::error::most_drawn;
 use super::world::{Shape, World};
 use crate::query::ItemId;
-use crate::statistics::{Rate, rate_of};
+use crate::statistics::{Estimate, rate_of};
 use crate::visibility::truth::{RayIndex, SampleTruth, SolidBox, SurfaceIndex};
 use crate::visibility::{Rays, SampleGrid, fragment};
 
@@ -182,17 +182,17 @@ pub struct Errors {
     /// Visible candidates that are not returned.
     pub false_negative_count: f64,
     /// False positives / visible, by view.
-    pub excess: Option<Rate>,
+    pub excess: Option<Estimate>,
     /// False negatives / visible, by view.
-    pub missing: Option<Rate>,
+    pub missing: Option<Estimate>,
     /// Share of the samples whose front item the stage drops, by view.
-    pub image_error: Option<Rate>,
+    pub image_error: Option<Estimate>,
     /// Most samples that one missing item is in front at.
     pub worst_missing_samples: u64,
     /// Longest run of consecutive views that each lack a visible item.
     pub longest_missing_streak: usize,
     /// Share of the candidates that are not visible that the stage removed.
-    pub removed_share: Option<Rate>,
+    pub removed_share: Option<Estimate>,
 }
 
 impl Errors {
@@ -201,7 +201,7 @@ impl Errors {
         let mean = |of: fn(&ViewCounts) -> u64| {
             views.iter().map(|view| of(view) as f64).sum::<f64>() / views.len().max(1) as f64
         };
-        let share = |of: fn(&ViewCounts) -> [u64; 2]| rate_of(views, of).map(Rate::of_share);
+        let share = |of: fn(&ViewCounts) -> [u64; 2]| rate_of(views, of).map(Estimate::of_share);
         let streaks = views.split(|view| view.false_negatives == 0);
         let worst = views.iter().map(|v| v.worst_missing_samples).max();
         Errors {

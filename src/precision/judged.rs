@@ -11,7 +11,7 @@ use crate::measure::blamed;
 use crate::path::{CameraPath, evenly};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
-use crate::statistics::Rate;
+use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -45,9 +45,9 @@ pub struct CullingErrors {
     #[serde(flatten)]
     pub names: Names,
     /// False positives / visible items, by camera.
-    pub excess: Option<Rate>,
+    pub excess: Option<Estimate>,
     /// Visible items that were not returned, in millionths.
-    pub false_negative_ppm: Option<Rate>,
+    pub false_negative_ppm: Option<Estimate>,
     /// The same as counts; null for what is refused.
     #[serde(flatten, serialize_with = "counts_or_null")]
     pub counts: Option<ErrorCount>,

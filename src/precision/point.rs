@@ -96,7 +96,7 @@ impl Point {
         let errors = CullingErrors {
             names: Names::of(culling),
             excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
-            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
+            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
             counts: is_judged.then_some(counts),
             worst_miss_px: in_pixels().reduce(f64::max),
             ns_per_item: None,

@@ -20,7 +20,7 @@ use crate::geometry::{Aabb, MAX_PLANES};
 use crate::measure::blamed;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::statistics::{Rate, rate_of};
+use crate::statistics::{Estimate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
@@ -82,9 +82,9 @@ pub struct SweepRow {
     #[serde(flatten)]
     pub names: Names,
     /// Null if the planes cannot be made.
-    pub false_negative_ppm: Option<Rate>,
+    pub false_negative_ppm: Option<Estimate>,
     /// False positives / visible items; null as above.
-    pub excess: Option<Rate>,
+    pub excess: Option<Estimate>,
     /// The same as counts; null as above.
     #[serde(flatten, serialize_with = "counts_or_null")]
     pub errors: Option<ErrorCount>,
@@ -96,9 +96,9 @@ impl SweepRow {
     /// The figure of the row: false positives of sizes, in percent of the visible.
     ///
     /// Missed items of cameras, in millionths.
-    pub fn error(&self) -> Option<Rate> {
+    pub fn error(&self) -> Option<Estimate> {
         match self.sweep {
-            Sweep::Size => self.excess.map(|rate| rate.per(100.0)),
+            Sweep::Size => self.excess.map(|rate| rate.times(100.0)),
             _ => self.false_negative_ppm,
         }
     }
@@ -215,7 +215,7 @@ impl SweptTest {
             sweep,
             value,
             names: self.names(),
-            false_negative_ppm: missed.map(|share| share.of_share().per(1e6)),
+            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
             excess: rate_of(judged, |e| [e.false_positives, e.visible]),
             errors: known.then(|| judged.iter().copied().sum()),
             refused: self.refused,
@@ -434,7 +434,7 @@ mod tests {
             for other in &sweeps[1..] {
                 let other = other[n].excess.unwrap();
                 let off = (first.value - other.value).abs();
-                let width = |rate: &Rate| rate.upper.unwrap() - rate.value;
+                let width = |rate: &Estimate| rate.upper.unwrap() - rate.value;
                 cells += 1;
                 apart += usize::from(off > width(&first).hypot(width(&other)));
             }

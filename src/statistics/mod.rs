@@ -18,7 +18,7 @@ pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean, median, quantile, sorted, two_speeds};
 pub use one_run::{Estimate, one_run, ratio, speedup};
 pub use ranking::{ALPHA, Standing, dominance, is_less, ranks};
-pub use rate::{Rate, rate, rate_of, shows_less};
+pub use rate::{rate, rate_of, shows_less};
 pub use student::slope;
 pub use trimmed::{Trimmed, centre, trimmed_mean};
 pub use unpaired::judge_unpaired;

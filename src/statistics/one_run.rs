@@ -9,7 +9,7 @@ use super::{Trimmed, trimmed_mean};
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
 
-/// A value with its 95 % interval; no interval below three processes.
+/// A value with its 95 % interval; no interval below three processes, or two clusters.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Estimate {
     /// The value itself.
@@ -53,6 +53,21 @@ impl Estimate {
             lower: self.lower.map(|end| end / units),
             upper: self.upper.map(|end| end / units),
         }
+    }
+
+    /// Value and interval times a number of units, such as a million.
+    pub fn times(self, units: f64) -> Estimate {
+        Estimate {
+            value: self.value * units,
+            lower: self.lower.map(|end| end * units),
+            upper: self.upper.map(|end| end * units),
+        }
+    }
+
+    /// The same for a share, which is no more than 1.
+    pub fn of_share(mut self) -> Estimate {
+        self.upper = self.upper.map(|upper| upper.min(1.0));
+        self
     }
 }
 

@@ -3,47 +3,16 @@
 //! A camera is one observation: its items share the same planes, so their errors are
 //! correlated.
 
-use serde::{Deserialize, Serialize};
-
 use super::means::{mean, squares};
-use super::student;
+use super::{Estimate, student};
 
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
 /// Nothing seen in n: below 3/n at 95 %, because 0.95 = 1 - exp(-3).
 const NOTHING_SEEN: f64 = 3.0;
 
-/// Events per unit, with how well the sample tells it.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Rate {
-    /// Events / units over the whole sample.
-    pub value: f64,
-    /// The 95 % interval; null from one cluster alone.
-    pub lower: Option<f64>,
-    /// Upper end of the interval.
-    pub upper: Option<f64>,
-}
-
-impl Rate {
-    /// The same for units of which each has one event at most.
-    pub fn of_share(mut self) -> Rate {
-        self.upper = self.upper.map(|x| x.min(1.0));
-        self
-    }
-
-    /// The same for another number of units, such as a million.
-    pub fn per(self, units: f64) -> Rate {
-        let times = |x: Option<f64>| x.map(|x| x * units);
-        Rate {
-            value: self.value * units,
-            lower: times(self.lower),
-            upper: times(self.upper),
-        }
-    }
-}
-
 /// The rate of clusters by their numbers of events and units.
-pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Rate> {
+pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Estimate> {
     let counts = clusters.iter().map(|cluster| of(cluster).map(|n| n as f64));
     rate(&counts.collect::<Vec<_>>())
 }
@@ -66,7 +35,7 @@ pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Rate> {
 /// let nothing = rate(&[[0.0, 100.0], [0.0, 200.0]]).unwrap();
 /// assert_eq!(nothing.upper, Some(0.01));
 /// ```
-pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
+pub fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
     let sum = |k: usize| clusters.iter().map(|c| c[k]).sum::<f64>();
     let (events, units) = (sum(0), sum(1));
     let value = events / units;
@@ -79,7 +48,7 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
     let margin = student::quantile(0.5 + LEVEL / 2.0, count - 1.0) * error;
     let least = NOTHING_SEEN / units;
     let several = |x: f64| (clusters.len() > 1).then_some(x);
-    Some(Rate {
+    Some(Estimate {
         value,
         lower: several((value - margin).max(0.0)),
         upper: several(value + margin.max(least)),
@@ -148,10 +117,10 @@ mod tests {
 
     #[test]
     fn intervals_hold_the_truth() {
-        let rates: Vec<Rate> = (0..2000)
+        let rates: Vec<Estimate> = (0..2000)
             .map(|seed| rate(&sample(seed, 30)).unwrap())
             .collect();
-        let holds = |r: &&Rate| r.lower.unwrap() <= 0.3 && 0.3 <= r.upper.unwrap();
+        let holds = |r: &&Estimate| r.lower.unwrap() <= 0.3 && 0.3 <= r.upper.unwrap();
         let held = rates.iter().filter(holds).count();
         assert!((1860..=1940).contains(&held), "{held} of 2000");
     }
