@@ -27,10 +27,8 @@ pub struct ReportCell {
     /// Label of the structure or name of the bound.
     pub structure: String,
     /// Kind that the structure declares; null for a bound and in older reports.
-    #[serde(default)]
     pub kind: Option<Kind>,
     /// Likewise.
-    #[serde(default)]
     pub origin: Option<Origin>,
     /// Parameters of the structure, defaults included.
     pub params: Value,
@@ -42,7 +40,6 @@ pub struct ReportCell {
     pub reason: Option<String>,
     /// Fastest first; cells that no test tells apart share a rank. Null where
     /// there is no time.
-    #[serde(default)]
     pub rank: Option<usize>,
     /// Basis of the metrics of time.
     #[serde(default)]
@@ -148,10 +145,8 @@ pub struct TwinEntry {
     /// Time of the second entry / time of the first.
     pub ratio: f64,
     /// Lower end of the ratio's 95 % interval.
-    #[serde(default)]
     pub lower: Option<f64>,
     /// Upper end of the ratio's 95 % interval.
-    #[serde(default)]
     pub upper: Option<f64>,
 }
 
@@ -218,7 +213,6 @@ pub struct SceneInfo {
     #[serde(default)]
     pub up: String,
     /// Unit of coordinates; null where the file does not say.
-    #[serde(default)]
     pub unit: Option<String>,
     /// Scene-local zero in world coordinates.
     pub origin: [f64; 3],
@@ -277,10 +271,8 @@ pub struct PathInfo {
     /// The numbers that the culling test is carried out in.
     pub arithmetic: String,
     /// SHA-256 over the cameras' frames and lenses; null in older reports.
-    #[serde(default)]
     pub digest: Option<String>,
     /// Lenses as used, and how matrices were read; null in older reports.
-    #[serde(default)]
     pub lens: Option<CameraFacts>,
     /// Doubts about the cameras, one line each.
     #[serde(default)]

@@ -158,7 +158,6 @@ pub struct Judged {
     #[serde(flatten)]
     pub errors: ErrorCount,
     /// The 95 % interval of the false positives per visible item, by camera.
-    #[serde(default)]
     pub excess_interval: Option<[f64; 2]>,
 }
 

@@ -78,7 +78,6 @@ pub struct RunInfo {
     #[serde(default = "one")]
     pub threads: u32,
     /// `i/n` where only a share of the plan was run.
-    #[serde(default)]
     pub shard: Option<String>,
     /// Scenes and paths of the plan that nothing was measured of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
