@@ -107,25 +107,12 @@ pub struct Plan {
     pub seed: u64,
 }
 
-/// A group of one scene: path, cache state and culling test.
-#[derive(Clone, PartialEq, Debug)]
-pub struct SceneGroup {
-    /// File or spec of the path.
-    pub path: String,
-    /// True if caches are emptied before each query.
-    pub cold: bool,
-    /// Test, arithmetic and planes.
-    pub culling: Culling,
-    /// File or spec of the motion; empty for a still scene.
-    pub motion: String,
-}
-
 impl Plan {
-    /// The groups of a scene, in the order in which they are measured.
+    /// The groups of a scene with their cullings, in the order in which they are measured.
     ///
     /// Tests over boxes come before those over spheres, so that structures are built
     /// twice at most.
-    pub fn groups_of(&self, scene: &PlannedScene) -> Vec<SceneGroup> {
+    pub fn groups_of(&self, scene: &PlannedScene) -> Vec<(GroupKey, Culling)> {
         let still = [String::new()];
         let motions = match self.motions.is_empty() {
             true => &still[..],
@@ -136,26 +123,21 @@ impl Plan {
             let caches = 1 + usize::from(scene.cold);
             for cold in [false, true].into_iter().take(caches) {
                 for motion in motions {
-                    groups.extend(self.cullings.iter().map(|&culling| SceneGroup {
-                        path: path.clone(),
-                        cold,
-                        culling,
-                        motion: motion.clone(),
+                    groups.extend(self.cullings.iter().map(|culling| {
+                        let key = GroupKey::of(&scene.source, path, cold, culling, motion);
+                        (key, *culling)
                     }));
                 }
             }
         }
-        groups.sort_by_key(|group| group.culling.test == CullingTest::Sphere);
+        groups.sort_by_key(|(_, culling)| culling.test == CullingTest::Sphere);
         groups
     }
 
     /// Keys of the groups of a scene, in the same order.
     pub fn keys_of(&self, scene: &PlannedScene) -> Vec<GroupKey> {
-        let key = |own: SceneGroup| {
-            let (path, motion) = (&own.path, &own.motion);
-            GroupKey::of(&scene.source, path, own.cold, &own.culling, motion)
-        };
-        self.groups_of(scene).into_iter().map(key).collect()
+        let groups = self.groups_of(scene).into_iter();
+        groups.map(|(key, _)| key).collect()
     }
 
     /// Keys of all groups, in the order in which they are measured.
@@ -306,29 +288,29 @@ pub fn measure_scene(
     let info = SceneInfo::of(&scene);
     let sweep = Machine::capture().cache_sweep_bytes();
     let mut built: Option<(bool, Vec<Subject>)> = None;
-    for (n, group) in plan.groups_of(planned).into_iter().enumerate() {
+    for (n, (key, culling)) in plan.groups_of(planned).into_iter().enumerate() {
         if !share.wanted[n] {
             continue;
         }
         let known = share.known[n].as_ref();
         // Built once for all tests over boxes, and again for spheres.
-        let of_spheres = group.culling.test == CullingTest::Sphere;
+        let of_spheres = culling.test == CullingTest::Sphere;
         // The old ones go first: memory for one set is enough.
         drop(built.take_if(|(kind, _)| *kind != of_spheres));
-        let build = || plan.subjects(&scene, group.culling.test, share, notice);
+        let build = || plan.subjects(&scene, culling.test, share, notice);
         let (_, subjects) = built.get_or_insert_with(|| (of_spheres, build()));
-        notice(None, &group.path);
+        notice(None, &key.path);
         let scale = known.and_then(|known| known.lens_scale);
-        let path = path::load_scaled(&group.path, &scene, &plan.lens, scale)?;
-        let motion = Some(&group.motion).filter(|motion| !motion.is_empty());
+        let path = path::load_scaled(&key.path, &scene, &plan.lens, scale)?;
+        let motion = Some(&key.motion).filter(|motion| !motion.is_empty());
         let motion = motion.map(|motion| Motion::load(motion, &scene));
         let (motion, views) = (motion.transpose()?, plan.views_per_frame);
-        let workload = Workload::moving(&scene, &path, &group.culling, motion, views)?;
+        let workload = Workload::moving(&scene, &path, &culling, motion, views)?;
         let protocol = Protocol {
             rounds: plan.effort.rounds,
             task_ns: plan.effort.task_ns,
             cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
-            cold: group.cold,
+            cold: key.cache == "cold",
             // Other orders in each process.
             seed: plan.seed.wrapping_add(u64::from(share.process)),
             cache_bytes: sweep,

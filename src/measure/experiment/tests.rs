@@ -75,7 +75,9 @@ fn keys_are_told_apart_and_structures_built_twice_at_most() {
     }
     for scene in &plan.scenes {
         let groups = plan.groups_of(scene);
-        let mut spheres = groups.iter().map(|g| g.culling.test == CullingTest::Sphere);
+        let mut spheres = groups
+            .iter()
+            .map(|group| group.1.test == CullingTest::Sphere);
         let first = spheres.position(|is_sphere| is_sphere);
         assert!(first.is_some_and(|first| first > 0));
         assert!(spheres.all(|is_sphere| is_sphere), "boxes after spheres");
