@@ -136,8 +136,9 @@ pub fn ask_all(
     Ok(agree)
 }
 
-/// Reports ids that are no item's, and questions with different answers; true if there is
-/// nothing to report.
+/// Reports ids that are no item's, and questions with different answers.
+///
+/// True if there is nothing to report.
 fn all_agree(rows: &[Row], what: &str) -> bool {
     let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;

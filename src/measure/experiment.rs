@@ -108,7 +108,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The groups of a scene with their cullings, in the order in which they are measured.
+    /// Groups of a scene with their cullings, in the order of measurement.
     ///
     /// Tests over boxes come before those over spheres, so that structures are built
     /// twice at most.

@@ -37,7 +37,7 @@ pub struct Built {
     pub build_ms: f64,
     /// Memory of the index over the items.
     pub memory: MemoryUsage,
-    /// CPU time of an update, ms; `None` in scenes too large to be moved in passing.
+    /// CPU time of an update, ms; `None` in scenes too large for it.
     pub update_ms: Option<f64>,
 }
 
@@ -151,9 +151,10 @@ const UPDATE_SHARE: f64 = 0.01;
 /// Largest scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 
-/// Times an update after [`UPDATE_SHARE`] of the items have moved by their own size, CPU ms.
+/// CPU time of an update after [`UPDATE_SHARE`] of the items have moved, ms.
 ///
-/// The first of two counts as little as the first build does. A search after them is checked.
+/// They move by their own size. Of two updates the second counts, as of builds. A search after
+/// them is checked.
 fn measure_update(
     spec: &StructureSpec,
     scene: &Scene,

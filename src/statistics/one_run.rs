@@ -9,7 +9,9 @@ use super::{Trimmed, trimmed_mean};
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
 
-/// A value with its 95 % interval; no interval below three processes, or two clusters.
+/// A value with its 95 % interval, if there is one.
+///
+/// There is none below three processes, or two clusters of a rate.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Estimate {
     /// The value itself.
