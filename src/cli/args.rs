@@ -298,7 +298,7 @@ pub struct PrecisionArgs {
     /// Cubes for each size of the sweep over sizes; 0 skips all sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX))]
     pub cubes: usize,
-    /// Show every table: all points, the sweeps
+    /// Show every table: errors of every culling, the sweeps
     #[arg(long)]
     pub all: bool,
     /// Also write the figures and all tables as one page

@@ -67,8 +67,7 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
     blocks.push(Block::heading("Conclusions:"));
     let told = precision_conclusions::conclusions(outcome).into_iter();
     blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
-    let more = "every point and sweeps: --all";
-    blocks.extend(Block::more(all, more));
+    blocks.extend(Block::more(all, "errors of every culling, sweeps: --all"));
     blocks
 }
 

@@ -1,5 +1,5 @@
-//! Tables of `cullbench precision`: errors and times, the Pareto fronts and the
-//! sweeps. Sentences about them are in `precision_conclusions`.
+//! Tables of `cullbench precision`: errors, the Pareto front and the sweeps.
+//! Sentences about them are in `precision_conclusions`.
 
 use super::document::Block;
 use super::table::{Column, Table};
@@ -10,7 +10,7 @@ use crate::statistics::Estimate;
 
 /// The Pareto front within `room` characters.
 ///
-/// With `all` every point and the sweeps too.
+/// With `all` the errors of every culling and the sweeps too.
 pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
@@ -29,11 +29,8 @@ pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         blocks.extend((!note.is_empty()).then(|| Block::line(note)));
     };
     if all {
-        let fastest = fastest(&p.points);
         let title = "Errors, by test, numbers and planes";
-        add(title, errors_table(&fastest), ERRORS_NOTE);
-        let title = "Times, the fastest structure for each";
-        add(title, times_table(&fastest), "");
+        add(title, errors_table(&p.points), ERRORS_NOTE);
     }
     let title = "Pareto front of error, memory and time, fastest first";
     let whole = front_table(p);
@@ -98,21 +95,16 @@ pub fn numbers(names: &Names) -> String {
     format!("{arithmetic}{planes}{epsilon}")
 }
 
-/// The first point of each culling, in their order by test; points come fastest
-/// first.
-fn fastest(points: &[Point]) -> Vec<&Point> {
-    let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
-    let mut found: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
-    found.sort_by_key(|p| (p.errors.names.test, culling(&p.errors.names)));
-    found
-}
-
 pub fn percent(rate: Option<Estimate>) -> String {
     text::rate(rate, 100.0)
 }
 
-fn errors_table(points: &[&Point]) -> Table {
-    let columns: &[Column<&&Point>] = &[
+/// Errors of each culling, the same on every structure.
+fn errors_table(points: &[Point]) -> Table {
+    let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
+    let mut points: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
+    points.sort_by_key(|p| (p.errors.names.test, culling(&p.errors.names)));
+    let columns: &[Column<&Point>] = &[
         ("culling", |p| culling(&p.errors.names)),
         (">FP %", |p| percent(p.errors.excess)),
         (">by source", |p| some(p.errors.counts, text::sources)),
@@ -120,26 +112,6 @@ fn errors_table(points: &[&Point]) -> Table {
         (">px", |p| some(p.errors.worst_miss_px, significant)),
     ];
     Table::with(points, columns)
-}
-
-fn times_table(points: &[&Point]) -> Table {
-    let columns: &[Column<&&Point>] = &[
-        ("front", |p| mark(p.on_front, p.is_tie).to_owned()),
-        ("culling", |p| culling(&p.errors.names)),
-        ("structure", |p| structure(p)),
-        (">query", |p| time_plus_minus(p.time)),
-        (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
-        ("status", |p| p.status.name().to_owned()),
-    ];
-    Table::with(points, columns)
-}
-
-fn mark(on_front: bool, is_tie: bool) -> &'static str {
-    match (on_front, is_tie) {
-        (_, true) => "* tie",
-        (true, _) => "*",
-        _ => "",
-    }
 }
 
 fn front_table(p: &Precision) -> Table {
