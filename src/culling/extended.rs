@@ -75,7 +75,7 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
 /// touch the volume are kept, the tightest ones if there are too many for
 /// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for
 /// the m faces' corners and O(m^2) sums.
-pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
+fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
     /// Least length of a sum of unit normals: a shorter one has lost too many digits
     /// to be a plane (1e-9 of it would be noise). Omitting it is always safe.
     const CANCELLED: f64 = 1e-7;

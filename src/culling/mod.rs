@@ -15,7 +15,8 @@ use crate::geometry::{
 };
 use crate::query::AnyVolume;
 
-pub use extended::{bounds, extended, farthest_corner, silhouettes};
+use extended::farthest_corner;
+pub use extended::{bounds, extended};
 
 named! {
     /// The test of a box against the volume.

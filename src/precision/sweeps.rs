@@ -10,13 +10,9 @@ use serde::Serialize;
 
 use super::judged::{Names, counts_or_null};
 use super::size::{BATCH, random_camera, strewn};
-use crate::camera::{
-    Camera, CameraError, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
-};
-use crate::culling::{
-    Arithmetic, CameraView, Culling, CullingError, CullingTest, farthest_corner, silhouettes,
-};
-use crate::geometry::{Aabb, MAX_PLANES};
+use crate::camera::{Camera, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Surroundings};
+use crate::culling::{Arithmetic, Culling, CullingTest};
+use crate::geometry::Aabb;
 use crate::measure::blamed;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
@@ -111,21 +107,9 @@ const DEPTH: f64 = 100.0;
 /// Boxes of each camera.
 const BOXES: usize = 500;
 
-/// How the planes of a swept test are made.
-#[derive(Clone, Copy)]
-enum Planes {
-    /// The culling's own planes.
-    Own,
-    /// Planes by axes that are cross products in f64, rounded as they come.
-    PlainFrame,
-    /// The faces with the silhouettes of the exact test.
-    Silhouettes,
-}
-
 /// A culling and its errors.
 struct SweptTest {
     culling: Culling,
-    planes: Planes,
     /// Errors by camera.
     errors: Vec<ErrorCount>,
     refused: Option<String>,
@@ -134,25 +118,19 @@ struct SweptTest {
 /// The tests by what they add to the faces, in f32 without epsilon.
 ///
 /// The exact test also with it, and in f64.
-fn tests_of_sizes() -> Vec<(Culling, Planes)> {
+fn tests_of_sizes() -> Vec<Culling> {
     use CullingTest::{Exact, SixBox, SixPlane, Sphere};
     let moved = PlaneOptions::default();
     let bare = moved.without_epsilon();
     let in_f32 = |test| Culling::new(test, Arithmetic::F32, bare);
-    vec![
-        (in_f32(Sphere), Planes::Own),
-        (in_f32(SixPlane), Planes::Own),
-        (in_f32(SixBox), Planes::Own),
-        (in_f32(SixPlane), Planes::Silhouettes),
-        (in_f32(Exact), Planes::Own),
-        (Culling::new(Exact, Arithmetic::F32, moved), Planes::Own),
-        (Culling::new(Exact, Arithmetic::F64, bare), Planes::Own),
-    ]
+    let mut all = Vec::from([Sphere, SixPlane, SixBox, Exact].map(in_f32));
+    all.push(Culling::new(Exact, Arithmetic::F32, moved));
+    all.push(Culling::new(Exact, Arithmetic::F64, bare));
+    all
 }
 
-/// The f32 default, with a plain frame as well; f64, f32 about the eye and every
-/// derivation without epsilon.
-fn tests_of_cameras() -> Vec<(Culling, Planes)> {
+/// The f32 default; f64, f32 about the eye and every derivation without epsilon.
+fn tests_of_cameras() -> Vec<Culling> {
     let bare = PlaneOptions::default().without_epsilon();
     let of = |arithmetic, method| {
         let planes = PlaneOptions { method, ..bare };
@@ -160,10 +138,8 @@ fn tests_of_cameras() -> Vec<(Culling, Planes)> {
     };
     let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| of(a, bare.method));
     let methods = PLANE_METHODS.map(|(method, ..)| of(Arithmetic::F32, method));
-    let plain = (Culling::default(), Planes::PlainFrame);
-    let mut all = vec![(Culling::default(), Planes::Own), plain];
-    let others = arithmetics.into_iter().chain(methods);
-    all.extend(others.map(|culling| (culling, Planes::Own)));
+    let mut all = vec![Culling::default()];
+    all.extend(arithmetics.into_iter().chain(methods));
     all
 }
 
@@ -173,38 +149,12 @@ impl SweptTest {
             Sweep::Size => tests_of_sizes(),
             _ => tests_of_cameras(),
         };
-        let tests = tests.into_iter().map(|(culling, planes)| SweptTest {
+        let tests = tests.into_iter().map(|culling| SweptTest {
             culling,
-            planes,
             errors: Vec::new(),
             refused: None,
         });
         tests.collect()
-    }
-
-    fn names(&self) -> Names {
-        let mut names = Names::of(&self.culling);
-        match self.planes {
-            Planes::Own => {}
-            Planes::PlainFrame => names.planes = "frame-plain",
-            Planes::Silhouettes => names.test = "six+silhouettes",
-        }
-        names
-    }
-
-    fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
-        match self.planes {
-            Planes::Own => self.culling.view(camera, around),
-            Planes::PlainFrame => self.culling.view(&with_plain_frame(camera)?, around),
-            Planes::Silhouettes => {
-                let wide = camera.convex_volume_f64(around)?;
-                let faces = wide.planes();
-                let room = MAX_PLANES - faces.len();
-                let more = silhouettes(faces, room, farthest_corner(faces));
-                let volume = camera.volume_with(&more, &self.culling.planes, around)?;
-                Ok(CameraView::Volume(volume))
-            }
-        }
     }
 
     fn row(self, sweep: Sweep, value: f64) -> SweepRow {
@@ -214,26 +164,13 @@ impl SweptTest {
         SweepRow {
             sweep,
             value,
-            names: self.names(),
+            names: Names::of(&self.culling),
             false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
             excess: rate_of(judged, |e| [e.false_positives, e.visible]),
             errors: known.then(|| judged.iter().copied().sum()),
             refused: self.refused,
         }
     }
-}
-
-/// The same camera with axes from the pose by rounded cross products.
-fn with_plain_frame(camera: &Camera) -> Result<Camera, CameraError> {
-    let (eye, forward, up) = match Pose::of(camera) {
-        Pose::LookAt { eye, look, up } => (eye, look - eye, up),
-        Pose::Forward { eye, forward, up } => (eye, forward, up),
-    };
-    let u = forward.cross(up).normalize();
-    Ok(Camera {
-        frame: Frame::looking_along(eye, forward, u.cross(forward))?,
-        lens: camera.lens,
-    })
 }
 
 /// Judges `cameras` random cameras at every value with every test; the same
@@ -315,7 +252,7 @@ fn judge(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [Sw
         return;
     };
     for test in tests {
-        match test.view(camera, around) {
+        match test.culling.view(camera, around) {
             Ok(view) => {
                 let (view, of) = (view.as_any(), test.culling.test);
                 let answer: Vec<ItemId> = scan(&of.items(boxes), |b| view.sees(b)).collect();
@@ -372,11 +309,6 @@ mod tests {
         let rows = sweep(Sweep::Offset, 6, 1);
         assert!(lost(of(&rows, 1e6, "f32", "gh-gl-f32")) > 0);
         assert_eq!(lost(of(&rows, 1e7, "f64", "frame")), 0);
-        // Axes that were rounded as they came: c = 8 is no help.
-        let rows = sweep(Sweep::Up, 6, 1);
-        let plain = |row: &&SweepRow| row.names.planes == "frame-plain";
-        let by_angle: Vec<u64> = rows.iter().filter(plain).map(lost).collect();
-        assert!(by_angle[0] == 0 && by_angle[4] > 0, "{by_angle:?}");
     }
 
     /// The errors of every test of sizes.

@@ -309,7 +309,7 @@ fn the_sweep_over_sizes_finds_the_published_excess() {
     ];
     let rows = array(small(), "sweeps").iter();
     let rows: Vec<&Value> = rows.filter(|row| row["sweep"] == "size").collect();
-    assert_eq!(rows.len(), 7 * published.len());
+    assert_eq!(rows.len(), 6 * published.len());
     let bare = ("f32", 0.0);
     for (ratio, percent) in published {
         let of = |test: &str, (arithmetic, epsilon): (&str, f64)| -> f64 {
