@@ -89,8 +89,8 @@ struct Changed {
 pub struct Beside {
     /// Labels of the structures in question.
     contenders: Vec<String>,
-    /// Labels under further policies, on the workload itself.
-    policies: Vec<String>,
+    /// Label of the structure taken that is rebuilt, on the workload itself.
+    rebuilt: Option<String>,
     /// Values of the workload itself; `None` on an axis that it does not have.
     here: [Option<f64>; 3],
     changed: Vec<Changed>,
@@ -100,17 +100,17 @@ impl Beside {
     /// Plans the workloads; returns the results of the count pass, too.
     pub(super) fn plan(
         input: &AdviseInput,
-        [contenders, policies]: [Vec<String>; 2],
+        (contenders, rebuilt): (Vec<String>, Option<String>),
         here: [Option<f64>; 3],
         progress: &dyn Fn(&str),
     ) -> (Beside, Vec<Part>) {
         let mut beside = Beside {
             contenders,
-            policies,
+            rebuilt,
             here,
             changed: Vec::new(),
         };
-        let mut wanted = vec![(None, 0.0); usize::from(!beside.policies.is_empty())];
+        let mut wanted = vec![(None, 0.0); usize::from(beside.rebuilt.is_some())];
         // A choice needs two.
         let axes = AXES.into_iter().zip(here);
         for ((axis, values), here) in axes.filter(|_| beside.contenders.len() > 1) {
@@ -140,9 +140,9 @@ impl Beside {
         (beside, parts)
     }
 
-    /// True if the first workload is the one without a change, under further policies.
-    pub(super) fn has_policies(&self) -> bool {
-        !self.policies.is_empty() && self.changed.first().is_some_and(|c| c.axis.is_none())
+    /// True if the first workload is the one without a change, with rebuilds.
+    pub(super) fn has_rebuilds(&self) -> bool {
+        self.rebuilt.is_some() && self.changed.first().is_some_and(|c| c.axis.is_none())
     }
 
     /// Measures the workloads in one process.
@@ -251,12 +251,12 @@ impl Changed {
         }
         let culling = Culling::default();
         let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
-        let further = beside.policies.iter().filter(|_| self.axis.is_none());
+        let rebuilt = beside.rebuilt.iter().filter(|_| self.axis.is_none());
         let build = |label: &String| {
             let spec = planned(&input.setting.structures, label);
             Subject::build(spec, false, scene, CullingTest::SixPlane)
         };
-        let subjects: Vec<_> = beside.contenders.iter().chain(further).map(build).collect();
+        let subjects: Vec<_> = beside.contenders.iter().chain(rebuilt).map(build).collect();
         let info = SceneInfo::of(scene);
         let plan = GroupPlan {
             process: u32::from(self.known.is_some()),

@@ -114,9 +114,9 @@ pub fn prepare(
     let moved = workload.motion.as_ref().map(Motion::share);
     let here = [Some(items), visible.map(|count| count / items), moved];
     let contenders = structure.contenders(moved.is_some());
-    let (motion, policies) =
-        MotionChoice::begun(input, &structure, workload.motion.as_ref()).unzip();
-    let labels = [contenders, policies.unwrap_or_default()];
+    let begun = (workload.motion.as_ref()).map(|_| MotionChoice::begun(input, &structure));
+    let (motion, rebuilt) = begun.unzip();
+    let labels = (contenders, rebuilt.flatten());
     let (beside, counted) = Beside::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
     let mut trials = Trials::new(&case);
@@ -175,8 +175,8 @@ impl Prepared {
         let tests = &self.entered.tests;
         let test = TestChoice::of(tree, input.draw_ns, tests, answered, &times);
         let groups = beside.groups(self.counted, processes);
-        // Under further policies the first one is the workload itself.
-        let here = groups.first().filter(|_| beside.has_policies());
+        // With rebuilds the first one is the workload itself.
+        let here = groups.first().filter(|_| beside.has_rebuilds());
         let here = here.map_or(&self.structure.rows, |group| &group.cells);
         let changes = beside.changes(here, &groups);
         // The times of the stages come behind those of the tasks.

@@ -6,15 +6,8 @@ use super::choice::{StructureChoice, ns};
 use super::options::AdviseInput;
 use crate::index::UpdatePolicy;
 use crate::measure::ReportCell;
-use crate::motion::Motion;
 
-/// Policies measured beside the refit, unless their builds alone take longer.
-const POLICIES: [UpdatePolicy; 3] = [
-    UpdatePolicy::Rebuild,
-    UpdatePolicy::Every(10),
-    UpdatePolicy::Every(50),
-];
-/// A policy is ruled out where its builds alone take this many times a frame.
+/// Rebuilds are ruled out where the builds alone take this many times a frame.
 const RULED_OUT: f64 = 1.5;
 
 /// The policy to update the structure by.
@@ -34,43 +27,30 @@ pub struct MotionChoice {
 }
 
 impl MotionChoice {
-    /// The choice before it is made, and labels of the policies to be measured.
+    /// The choice before it is made, and the label of the rebuilds to be measured.
     ///
-    /// `None` for a still scene. Policies of `--update` are rows of the run instead. Those
-    /// without a second rebuild in the frames are left out.
+    /// Policies of `--update` are rows of the run instead.
     pub(super) fn begun(
         input: &AdviseInput,
         structure: &StructureChoice,
-        motion: Option<&Motion>,
-    ) -> Option<(MotionChoice, Vec<String>)> {
-        let motion = motion?;
-        let (mut ruled_out, mut measured) = (Vec::new(), Vec::new());
+    ) -> (MotionChoice, Option<String>) {
         let mut all = input.setting.structures.iter();
         let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
         let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
-        let refits = spec.is_none_or(|spec| spec.info().refits);
-        let spec = spec.filter(|_| refits);
-        for policy in POLICIES.into_iter().filter(|_| !are_rows) {
-            let frames = match policy {
-                UpdatePolicy::Every(frames) if 2 * frames as usize > motion.frames() => continue,
-                UpdatePolicy::Every(frames) => f64::from(frames),
-                _ => 1.0,
-            };
-            let (Some(spec), Some(row)) = (spec, structure.rows.first()) else {
-                continue;
-            };
-            let builds = row.value("build_ms").unwrap_or(0.0) * 1e6 / frames;
-            match builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
-                true => ruled_out.push((policy.to_string(), builds)),
-                false => measured.push(format!("{}@{policy}", spec.label)),
-            }
-        }
-        let begun = MotionChoice {
-            ruled_out,
-            refits,
+        let mut begun = MotionChoice {
+            refits: spec.is_none_or(|spec| spec.info().refits),
             ..MotionChoice::default()
         };
-        Some((begun, measured))
+        let spec = spec.filter(|_| begun.refits && !are_rows);
+        let rebuilt = spec.zip(structure.rows.first()).and_then(|(spec, row)| {
+            let builds = row.value("build_ms").unwrap_or(0.0) * 1e6;
+            if builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
+                begun.ruled_out.push(("rebuild".to_owned(), builds));
+                return None;
+            }
+            Some(format!("{}@rebuild", spec.label))
+        });
+        (begun, rebuilt)
     }
 
     /// Chooses among the cells of the structure that is taken, under several policies.

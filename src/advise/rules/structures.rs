@@ -105,8 +105,7 @@ pub(super) fn rebuild() -> anyhow::Result<Draft> {
             let mut ranked = motion.policies.iter().filter(|cell| cell.rank.is_some());
             ranked.find(|cell| policy_of(&cell.structure) == policy)
         };
-        let is_rebuild = |(policy, _): &&(String, f64)| policy == "rebuild";
-        let ruled_out = motion.ruled_out.iter().find(is_rebuild);
+        let ruled_out = motion.ruled_out.first();
         if let Some((&(_, builds), refitted)) = ruled_out.zip(cell("refit").and_then(ns)) {
             return Finding {
                 cost_ns: Some([builds, refitted]),
