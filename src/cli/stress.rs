@@ -16,7 +16,7 @@ use super::{Ending, interrupt, print, text};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::report::grouped;
-use crate::stress::extremes::{Extremes, Tally};
+use crate::stress::extremes::{self, Extremes, Tally};
 use crate::stress::{
     Name, ORACLE, Row, Section, Status, Vector, built_in, read_vectors_file, replay,
 };
@@ -45,12 +45,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let seed = first_seed(args.seed, cases)?;
     interrupt::from_now_on_finish();
     let started = Instant::now();
-    let extremes = Extremes {
-        structures: &structures,
-        seed,
-        cases,
-        threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
-    };
     // A smaller check of every other instruction set of this machine.
     let chosen = args.kernel.execution()?.kernel;
     let all_kernels = args.kernel.name.is_none();
@@ -60,9 +54,8 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let passes = others().map(|kernel| (kernel, cases.min(OF_OTHERS)));
     let passes: Vec<(Kernel, u64)> = passes.chain([(chosen, cases)]).collect();
     let vector_passes = (vectors.len() * passes.len()) as u64;
-    let case_passes = passes.iter();
-    let case_passes = case_passes.map(|&(_, cases)| Extremes { cases, ..extremes }.total());
-    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
+    let case_passes: u64 = passes.iter().map(|pass| extremes::total(pass.1)).sum();
+    let bar = ProgressBar::new(vector_passes + case_passes);
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
             let mut execution = spec.execution;
@@ -85,8 +78,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         if cases > 0 && !interrupt::asked() {
             let extremes = Extremes {
                 structures: &structures,
+                seed,
                 cases,
-                ..extremes
+                threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
             };
             found.extend(extremes.run(&|family| {
                 if bar.message() != family {

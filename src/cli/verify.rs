@@ -23,7 +23,7 @@ use crate::query::{ItemId, Located};
 use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
-    points_on_faces, variants,
+    points_on_faces, scan, variants,
 };
 
 /// Verdicts of the oracle for each scene and path.
@@ -248,9 +248,7 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
         let mut points = points_on_faces(camera, around.origin, volume.planes());
         points.retain(|point| point.reach().cmple(around.reach).all());
         if let Some(truth) = Truth::of_camera(camera, around.origin, &points) {
-            let seen = points.iter().zip(0..);
-            let seen = seen.filter(|(p, _)| view.as_any().sees(p));
-            let answer: Vec<_> = seen.map(|(_, id)| id).collect();
+            let answer: Vec<ItemId> = scan(&points, |p| view.as_any().sees(p)).collect();
             errors += truth.errors(&points, &answer);
         }
     }

@@ -40,7 +40,7 @@ impl Dimension {
 }
 
 /// A structure with a culling, its errors and its time.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct Point {
     /// Label of the structure.
     pub structure: String,
@@ -63,28 +63,12 @@ pub struct Point {
     pub on_front: bool,
     #[serde(skip)]
     dimensions: Vec<Dimension>,
-    /// Its place among the tasks that were timed, if it has a time.
+    /// Its place among the points before they are sorted, if it has a time.
     #[serde(skip)]
-    task: Option<usize>,
+    way: Option<usize>,
 }
 
 impl Point {
-    /// One without a time.
-    fn new(structure: &str, errors: CullingErrors, dimensions: Vec<Dimension>) -> Point {
-        Point {
-            structure: structure.to_owned(),
-            errors,
-            status: Status::Ok,
-            reason: None,
-            time: None,
-            dominated_by: None,
-            is_tie: false,
-            on_front: false,
-            dimensions,
-            task: None,
-        }
-    }
-
     /// A culling's errors as a point of a structure, without a time.
     pub(super) fn of(judged: &Judged, structure: &str, memory_bytes_per_item: f64) -> Point {
         let (refused, culling) = (&judged.refused, &judged.culling);
@@ -112,14 +96,18 @@ impl Point {
             Dimension::of(in_pixels(), f64::max),
             Dimension::fixed(memory_bytes_per_item),
         ];
-        let mut point = Point::new(structure, errors, dimensions);
-        point.reason = refused.clone();
-        point.status = match is_judged {
-            false => Status::Refused,
-            true if counts.false_negatives > 0 => Status::Unsafe,
-            true => Status::Ok,
-        };
-        point
+        Point {
+            structure: structure.to_owned(),
+            errors,
+            status: match is_judged {
+                false => Status::Refused,
+                true if counts.false_negatives > 0 => Status::Unsafe,
+                true => Status::Ok,
+            },
+            reason: refused.clone(),
+            dimensions,
+            ..Point::default()
+        }
     }
 
     /// Takes over what is wrong; true if nothing is.
@@ -130,11 +118,12 @@ impl Point {
         wrong.is_none()
     }
 
-    /// Takes over the time of a task, or why it has none.
-    pub(super) fn time(&mut self, times: &OverProcesses, task: usize) {
-        self.accepts(times.failure(task));
-        self.time = times.ns(task);
-        self.task = self.time.map(|_| task);
+    /// Takes over the time of a way, or why it has none.
+    pub(super) fn time(&mut self, times: &OverProcesses<(usize, bool)>, way: usize, items: usize) {
+        self.accepts(times.failure((way, false)));
+        self.time = times.ns((way, false));
+        self.way = self.time.map(|_| way);
+        self.errors.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
     }
 
     /// Time of a query, ns.
@@ -162,7 +151,7 @@ pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usiz
             (Some(a), Some(b)) if a.by_camera.is_empty() && b.by_camera.is_empty() => true,
             (Some(a), Some(b)) => shows_less(&a.by_camera, &b.by_camera, ALPHA),
             _ => {
-                let both = a.task.zip(b.task);
+                let both = a.way.zip(b.way);
                 both.is_some_and(|(a, b)| is_faster(a, b))
             }
         }
@@ -189,10 +178,13 @@ mod tests {
             by_camera: vec![0.0; 4],
         });
         dimensions.push(Dimension::fixed(memory));
-        let mut point = Point::new("linear", CullingErrors::default(), dimensions);
-        point.time = ns.map(Estimate::exact);
-        point.task = ns.map(|ns| ns as usize);
-        point
+        Point {
+            structure: "linear".to_owned(),
+            time: ns.map(Estimate::exact),
+            dimensions,
+            way: ns.map(|ns| ns as usize),
+            ..Point::default()
+        }
     }
 
     /// Times in steps of ten are told apart, those within a step are not.

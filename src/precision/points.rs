@@ -268,24 +268,16 @@ pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessT
 impl Prepared {
     /// The diagram from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
-        let (mut precision, plan) = (self.precision, self.plan);
-        let times = OverProcesses::of(processes);
-        // The twin comes last: the first task of its way is the original.
-        let original = |way| plan.tasks.iter().position(|(own, _)| own.0 == way);
-        let keys = plan.tasks.iter().map(|(key, _)| *key);
-        for (task, (way, is_twin)) in keys.enumerate() {
-            if is_twin {
-                precision.twin = original(way).and_then(|own| times.ratio(task, own));
-            } else {
-                let point = &mut precision.points[way];
-                point.time(&times, task);
-                let ns = point.query_ns();
-                point.errors.ns_per_item = ns.map(|ns| ns / precision.items as f64);
-            }
-        }
-        let is_faster = |a: usize, b: usize| times.is_faster(a, b);
+        let (mut precision, tasks) = (self.precision, self.plan.tasks);
+        let keys: Vec<(usize, bool)> = tasks.into_iter().map(|(key, _)| key).collect();
+        let twin = keys.iter().find(|key| key.1).map(|key| key.0);
+        let times = OverProcesses::keyed(keys, processes);
+        precision.twin = twin.and_then(|way| times.ratio((way, true), (way, false)));
         let points = &mut precision.points;
-        sort_and_mark(points, &is_faster);
+        for (way, point) in points.iter_mut().enumerate() {
+            point.time(&times, way, precision.items);
+        }
+        sort_and_mark(points, &|a, b| times.is_faster((a, false), (b, false)));
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
         precision.processes = processes.len();
         precision

@@ -49,14 +49,14 @@ pub type Progress<'a> = &'a (dyn Fn(&str) -> bool + Sync);
 /// A case that was run: its seed, its group of rows, and its findings.
 type Outcome = (u64, String, Findings);
 
-impl Extremes<'_> {
-    /// Number of cases, for a progress bar.
-    pub fn total(&self) -> u64 {
-        let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
-        let at_planes: u64 = PLANES_FAMILIES.iter().map(|f| f.factor).sum();
-        (variants as u64 + at_planes) * self.cases
-    }
+/// Number of cases in all, for a progress bar.
+pub fn total(cases: u64) -> u64 {
+    let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
+    let at_planes: u64 = PLANES_FAMILIES.iter().map(|f| f.factor).sum();
+    (variants as u64 + at_planes) * cases
+}
 
+impl Extremes<'_> {
     /// All families, a section each.
     pub fn run(&self, progress: Progress) -> Vec<Section> {
         let (planes, cameras) = (PLANES_FAMILIES.iter(), CAMERA_FAMILIES.iter());
