@@ -8,15 +8,13 @@ use crate::culling::{CameraView, Culling, CullingError, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::input::InputError;
-use crate::measure::{Workload, input_for, input_of};
+use crate::measure::{Workload, input_for, input_of, spread};
 use crate::path::{CameraPath, evenly};
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
 
 /// Most verdicts of the oracle: some 50 ns each.
 const MOST_JUDGED: usize = 1_000_000;
-/// Most cameras that are compared with the oracle.
-const MOST_TRUTHS: usize = 16;
 
 pub struct Case<'a> {
     pub workload: &'a Workload<'a>,
@@ -56,8 +54,8 @@ impl<'a> Case<'a> {
 
     /// Cameras of the path with the truth about them, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let most = (MOST_JUDGED / self.scene().items.len().max(1)).clamp(1, MOST_TRUTHS);
-        let truths = evenly(self.cameras(), most).filter_map(|camera| {
+        let judged = spread(self.scene().items.len(), MOST_JUDGED, self.cameras());
+        let truths = judged.filter_map(|camera| {
             let truth = Truth::of_scene(&self.workload.cameras[camera], self.scene())?;
             Some((camera, truth))
         });

@@ -13,8 +13,7 @@ use super::run_resume::{TypedOptions, command_line};
 use super::shared_args::first_seed;
 use super::verify_table::{Check, Outcome, RANDOM, show};
 use super::{Ending, interrupt, load_scene, print, program, text};
-use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
-use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
+use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
@@ -92,7 +91,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         verdicts: checks.iter().map(|c| c.verdicts).sum(),
         skipped_items,
         mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
-        against_cameras: is_safe(&culling),
+        against_cameras: culling.unproven().is_none(),
         seconds: started.elapsed().as_secs_f64(),
         seed,
         cases,
@@ -181,7 +180,7 @@ fn workloads<'a>(
             workload.views.push(CameraView::Volume(volume));
         }
     }
-    for other in other_cullings(culling) {
+    for other in Culling::all(culling.planes).filter(|other| other != culling) {
         let mut workload = Workload::new(scene, cameras, &other)?;
         workload.points.clear();
         let kind = format!("{} {}", other.test.name(), other.arithmetic.name());
@@ -190,27 +189,11 @@ fn workloads<'a>(
     Ok(all)
 }
 
-/// Every test and arithmetic but the given one, as far as they go together.
-fn other_cullings(culling: &Culling) -> Vec<Culling> {
-    let planes = culling.planes;
-    let of_test = |test| ARITHMETICS.map(|(numbers, ..)| Culling::new(test, numbers, planes));
-    let mut all: Vec<Culling> = TESTS.iter().flat_map(|row| of_test(row.0)).collect();
-    all.retain(|other| other != culling && other.check().is_ok());
-    all
-}
-
-/// Returns true if the culling must not miss anything that a camera sees.
-fn is_safe(culling: &Culling) -> bool {
-    culling.planes.method == PlaneMethod::Frame
-        && culling.planes.epsilon >= DEFAULT_EPSILON
-        && culling.arithmetic != Arithmetic::F64
-}
-
 /// Checks the reference's answers, which all structures that agreed share, against
 /// the oracle, for some of the cameras; points on their faces where the planes are safe.
 pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
-    let or_points = match is_safe(&workload.culling) {
+    let or_points = match workload.culling.unproven().is_none() {
         true => {
             errors += on_the_faces(workload);
             " (or points on the faces)"

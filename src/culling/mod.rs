@@ -126,6 +126,15 @@ impl Culling {
         }
     }
 
+    /// Every test in all numbers that it is made in, with planes derived so.
+    pub fn all(planes: PlaneOptions) -> impl Iterator<Item = Culling> {
+        let of_test = move |(test, ..): (CullingTest, &str, &str)| {
+            ARITHMETICS.map(|(numbers, ..)| Culling::new(test, numbers, planes))
+        };
+        let all = TESTS.into_iter().flat_map(of_test);
+        all.filter(|culling| culling.check().is_ok())
+    }
+
     /// The view of a camera in a scene's local coordinates; the same view
     /// serves every structure. O(m^3) for the m planes of the lens, a few
     /// microseconds for `exact`.

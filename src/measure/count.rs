@@ -177,7 +177,7 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
 /// Queries that are judged, evenly spread.
 ///
 /// Their number is from 1 to 16, as `most` verdicts allow.
-pub(super) fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
+pub fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
     evenly(queries, (most / items.max(1)).clamp(1, 16))
 }
 

@@ -64,7 +64,7 @@ pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo, T
 pub use clock::{Lap, Stopwatch};
 #[cfg(feature = "cli")]
 pub(crate) use count::blamed;
-pub use count::{Answer, Counted, Judged, count_pass, judge};
+pub use count::{Answer, Counted, Judged, count_pass, judge, spread};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{Effort, ExperimentError, Extras, Plan, PlannedScene, Share, measure_scene};
 pub use frames::measure;

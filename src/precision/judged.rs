@@ -8,7 +8,6 @@ use serde::{Serialize, Serializer};
 use crate::camera::Camera;
 use crate::culling::{CameraView, Culling};
 use crate::measure::blamed;
-use crate::path::{CameraPath, evenly};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::statistics::Estimate;
@@ -68,12 +67,6 @@ pub(super) fn counts_or_null<S: Serializer>(
     let counts = serde_json::to_value(errors.unwrap_or_default()).map_err(S::Error::custom)?;
     let named = counts.as_object().into_iter().flatten();
     serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
-}
-
-/// Cameras to test, evenly spread over a path.
-pub(super) fn chosen(path: &CameraPath, most: usize) -> Vec<Camera> {
-    let chosen = evenly(path.cameras.len(), most.max(1));
-    chosen.map(|i| path.cameras[i]).collect()
 }
 
 /// Errors of the answer to one camera.

@@ -3,11 +3,11 @@
 
 use serde::Serialize;
 
-use super::judged::{Judged, chosen};
+use super::judged::Judged;
 use super::point::{Point, sort_and_mark};
 use super::sweeps::SweepRow;
 use crate::camera::{Camera, PLANE_METHODS, PlaneOptions};
-use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
+use crate::culling::{Arithmetic, Culling, CullingTest};
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{
     OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_for,
@@ -66,21 +66,17 @@ pub struct Prepared {
 fn cullings() -> Vec<Culling> {
     let standard = PlaneOptions::default();
     let bare = standard.without_epsilon();
-    let mut all = Vec::new();
-    for (test, ..) in TESTS {
-        for (arithmetic, ..) in ARITHMETICS {
-            let options = [bare, standard].into_iter();
-            // f64 has no epsilon.
-            let options = options.take(if arithmetic == Arithmetic::F64 { 1 } else { 2 });
-            all.extend(options.map(|planes| Culling::new(test, arithmetic, planes)));
-        }
-    }
+    let all = Culling::all(standard).flat_map(|culling| {
+        // f64 has no epsilon.
+        let moved = (culling.arithmetic != Arithmetic::F64).then_some(standard);
+        let options = [Some(bare), moved].into_iter().flatten();
+        options.map(move |planes| Culling { planes, ..culling })
+    });
     let others = PLANE_METHODS.into_iter().map(|(method, ..)| method);
     let others = others.filter(|method| *method != standard.method);
     let others = others.map(|method| PlaneOptions { method, ..bare });
-    all.extend(others.map(|planes| Culling::new(CullingTest::SixPlane, Arithmetic::F32, planes)));
-    all.retain(|culling| culling.check().is_ok());
-    all
+    let others = others.map(|planes| Culling::new(CullingTest::SixPlane, Arithmetic::F32, planes));
+    all.chain(others).collect()
 }
 
 /// A structure over the boxes, and over the cubes of the sphere test.
@@ -200,7 +196,7 @@ impl Way<'_> {
 pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     let Setting { scene, path, .. } = setting;
     let items = scene.items.len();
-    let cameras = chosen(path, most);
+    let cameras = path.clone().at_most(most.max(1)).cameras;
     // A frame always makes a pose.
     let truths = cameras.iter().filter_map(|c| Truth::of_scene(c, scene));
     let truths: Vec<Truth> = truths.collect();
@@ -256,7 +252,8 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
 /// # Panics
 /// If the scene is not the one that was planned for.
 pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
-    let built = Built::new(setting, &chosen(&setting.path, most), &[])?;
+    let cameras = setting.path.clone().at_most(most.max(1)).cameras;
+    let built = Built::new(setting, &cameras, &[])?;
     let ways = built.ways();
     let timed = plan.timed(&setting.protocol, |&(way, _)| {
         let way = ways[way];
