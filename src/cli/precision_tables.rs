@@ -145,36 +145,33 @@ pub fn swept(value: f64) -> String {
 
 /// Table of the cullings that have any error, and a line on the others.
 fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
-    let mut values: Vec<f64> = rows.iter().map(|row| row.value).collect();
-    values.dedup();
     type Named = fn(&Names) -> String;
     let ([header, nothing, unit], name): (_, Named) = match rows[0].sweep {
         Sweep::Size => (["culling", "No false positives", "%"], culling),
         // All are of one test.
         _ => (["six-plane", "Nothing missed", "ppm"], numbers),
     };
-    let head = values.iter().map(|value| swept(*value));
+    let all = grouped(rows.iter().map(|row| (&row.names, *row)));
+    let head = all[0].1.iter().map(|row| swept(row.value));
     let mut table = Table::of_numbers([header.to_owned()].into_iter().chain(head));
-    let (mut sound, mut bound) = (Vec::new(), 0.0);
-    for kind in rows.iter().filter(|row| row.value == values[0]) {
-        let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();
-        let is_sound = |row: &&&SweepRow| row.error().is_some_and(|rate| rate.value == 0.0);
-        if own.iter().all(is_sound) {
-            sound.push(name(&kind.names));
-            let uppers = own.iter().filter_map(|row| row.error()?.upper);
-            bound = uppers.fold(bound, f64::max);
-            continue;
-        }
+    let is_sound = |row: &&SweepRow| row.error().is_some_and(|rate| rate.value == 0.0);
+    let all = all.into_iter();
+    let (sound, others): (Vec<_>, Vec<_>) = all.partition(|(_, own)| own.iter().all(is_sound));
+    for (names, own) in others {
         let errors = own.iter().map(|row| match &row.refused {
             Some(_) => "refused".to_owned(),
             None => text::rate(row.error(), 1.0),
         });
-        let label = name(&kind.names);
-        let is_named = kind.names.planes != "frame";
-        let short = label.strip_prefix("f32 ").filter(|_| is_named);
+        let label = name(names);
+        let short = label.strip_prefix("f32 ");
+        let short = short.filter(|_| names.planes != "frame");
         let label = short.unwrap_or(&label).to_owned();
         table.add_row([label].into_iter().chain(errors));
     }
+    let uppers = sound.iter().flat_map(|(_, own)| own);
+    let bound = uppers.filter_map(|row| row.error()?.upper);
+    let bound = bound.fold(0.0, f64::max);
+    let sound: Vec<String> = sound.iter().map(|(names, _)| name(names)).collect();
     let sound = some(sound.first(), |_| {
         let (bound, sound) = (significant(bound), sound.join(", "));
         format!("{nothing} (below {bound} {unit}): {sound}.")

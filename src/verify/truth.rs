@@ -4,7 +4,7 @@
 
 use crate::camera::Camera;
 use crate::geometry::Aabb;
-use crate::oracle::{Judgement, Oracle, Pose, Verdict};
+use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::ItemId;
 use crate::scene::{Originals, Scene, WorldBox};
 use glam::DVec3;
@@ -126,39 +126,35 @@ impl Truth {
     ) -> Option<Truth> {
         let of = |origin| Oracle::of_camera(&Pose::of(camera), &camera.lens, origin);
         let stored = of(origin)?;
-        if originals.boxes().is_none() {
-            return Some(Truth::new(stored, items));
-        }
-        let world = of(DVec3::ZERO)?;
-        let judge = |(id, item): (usize, &Aabb)| match originals.of_item(id) {
-            Some(b) => world.judge_wide(b.min, b.max),
-            None => stored.judge(item),
+        let written = match originals.boxes() {
+            Some(_) => Some((of(DVec3::ZERO)?, originals.clone())),
+            None => None,
         };
-        let judgements = items.iter().enumerate().map(judge).collect();
-        let mut truth = Truth::of_judgements(stored, judgements);
-        truth.written = Some((world, originals.clone()));
-        Some(truth)
+        Some(Truth::judged(stored, written, items))
     }
 
     /// The verdicts of an oracle. O(items).
     pub fn new(oracle: Oracle, items: &[Aabb]) -> Truth {
-        let judgements = items.iter().map(|item| oracle.judge(item)).collect();
-        Truth::of_judgements(oracle, judgements)
+        Truth::judged(oracle, None, items)
     }
 
-    fn of_judgements(oracle: Oracle, judgements: Vec<Judgement>) -> Truth {
-        let all = judgements.iter();
-        let count = |is_one: fn(&&Judgement) -> bool| all.clone().filter(is_one).count() as u64;
-        Truth {
-            written: None,
-            visible: ErrorCount {
-                visible: count(|judgement| judgement.verdict != Verdict::Out),
-                undecided: count(|judgement| judgement.undecided),
-                ..ErrorCount::default()
-            },
-            verdicts: all.map(|judgement| judgement.verdict).collect(),
+    fn judged(oracle: Oracle, written: Option<(Oracle, Originals)>, items: &[Aabb]) -> Truth {
+        let mut truth = Truth {
             oracle,
+            written,
+            verdicts: Vec::with_capacity(items.len()),
+            visible: ErrorCount::default(),
+        };
+        for (id, item) in items.iter().enumerate() {
+            let judgement = match truth.written.as_ref().zip(truth.original(id)) {
+                Some(((world, _), b)) => world.judge_wide(b.min, b.max),
+                None => truth.oracle.judge(item),
+            };
+            truth.visible.visible += u64::from(judgement.verdict != Verdict::Out);
+            truth.visible.undecided += u64::from(judgement.undecided);
+            truth.verdicts.push(judgement.verdict);
         }
+        truth
     }
 
     /// How deep item `id` reaches into the volume, as it was written.
