@@ -17,13 +17,13 @@ pub fn conclusions(p: &Precision) -> Vec<String> {
 
 /// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
 fn is_safe(point: &&Point) -> bool {
-    let errors = point.errors.counts.unwrap_or_default();
+    let errors = point.counts.unwrap_or_default();
     let missed = errors.false_negatives + errors.touch_dropped;
-    point.time.is_some() && missed == 0 && point.errors.names.epsilon > 0.0
+    point.time.is_some() && missed == 0 && point.names.epsilon > 0.0
 }
 
 fn missed(point: &Point) -> u64 {
-    point.errors.counts.unwrap_or_default().false_negatives
+    point.counts.unwrap_or_default().false_negatives
 }
 
 fn ratio(a: &Point, b: &Point) -> String {
@@ -33,7 +33,7 @@ fn ratio(a: &Point, b: &Point) -> String {
 
 /// The false positives of a point in words.
 fn extras(point: &Point) -> String {
-    match point.errors.excess {
+    match point.excess {
         None => "nothing is visible".to_owned(),
         excess => format!("false positives {} %", percent(excess)),
     }
@@ -49,7 +49,7 @@ fn of_points(p: &Precision) -> Vec<String> {
         "Fastest point that cannot miss an item: {name} at {time}, {}.",
         extras(fastest)
     )];
-    let extra = |point: &Point| point.errors.counts.map(|errors| errors.false_positives);
+    let extra = |point: &Point| point.counts.map(|errors| errors.false_positives);
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
@@ -57,7 +57,7 @@ fn of_points(p: &Precision) -> Vec<String> {
             "Fewer false positives take {times} times as long or more: {name}, {extra}."
         ));
     }
-    let depth = |point: &Point| point.errors.worst_miss_px.unwrap_or(0.0);
+    let depth = |point: &Point| point.worst_miss_px.unwrap_or(0.0);
     let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
     let worst = unsafe_.max_by(|a, b| depth(a).total_cmp(&depth(b)));
     all.push(match worst {
@@ -80,7 +80,7 @@ pub fn is_wrong(point: &Point) -> bool {
 }
 
 fn of_storage(p: &Precision) -> Option<String> {
-    let memory = |point: &&Point| point.errors.memory_bytes_per_item;
+    let memory = |point: &&Point| point.memory_bytes_per_item;
     let least = p.points.iter().filter(is_safe);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     let (name, bytes) = (named(least), text::significant(memory(&least)));
@@ -140,12 +140,12 @@ fn of_cameras(rows: &[SweepRow]) -> Option<String> {
 
 /// A point of a figure, if it has a time and an error.
 fn measured(point: &Point) -> Option<Measured> {
-    let (errors, missed) = (&point.errors, missed(point));
+    let missed = missed(point);
     let (name, time) = (named(point), text::some(point.query_ns(), text::time));
-    let (rate, extra) = (errors.excess?, percent(errors.excess));
+    let (rate, extra) = (point.excess?, percent(point.excess));
     Some(Measured {
         structure: point.structure.clone(),
-        test: errors.names.test.to_owned(),
+        test: point.names.test.to_owned(),
         point: diagram::Point {
             at: [point.query_ns()?, rate.value * 100.0],
             ends: rate

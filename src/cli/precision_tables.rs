@@ -12,7 +12,7 @@ use crate::statistics::Estimate;
 ///
 /// With `all` the errors of every culling and the sweeps too.
 pub fn blocks(p: &Precision, all: bool, room: usize) -> Vec<Block> {
-    let visible = p.points.iter().find_map(|point| point.errors.counts);
+    let visible = p.points.iter().find_map(|point| point.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
     let items = text::items(p.items, p.skipped_items);
     let cameras = text::counted(p.cameras, "camera");
@@ -77,7 +77,7 @@ const FRONT_NOTE: &str = "No other point is significantly better in an error, th
      missed, millionths; <: none observed, 95 % upper bound.";
 
 pub fn named(point: &Point) -> String {
-    format!("{} with {}", structure(point), culling(&point.errors.names))
+    format!("{} with {}", structure(point), culling(&point.names))
 }
 
 /// A culling in short.
@@ -101,15 +101,15 @@ pub fn percent(rate: Option<Estimate>) -> String {
 
 /// Errors of each culling, the same on every structure.
 fn errors_table(points: &[Point]) -> Table {
-    let all = grouped(points.iter().map(|p| (&p.errors.names, p)));
+    let all = grouped(points.iter().map(|p| (&p.names, p)));
     let mut points: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
-    points.sort_by_key(|p| (p.errors.names.test, culling(&p.errors.names)));
+    points.sort_by_key(|p| (p.names.test, culling(&p.names)));
     let columns: &[Column<&Point>] = &[
-        ("culling", |p| culling(&p.errors.names)),
-        (">FP %", |p| percent(p.errors.excess)),
-        (">by source", |p| some(p.errors.counts, text::sources)),
-        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
-        (">px", |p| some(p.errors.worst_miss_px, significant)),
+        ("culling", |p| culling(&p.names)),
+        (">FP %", |p| percent(p.excess)),
+        (">by source", |p| some(p.counts, text::sources)),
+        (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
+        (">px", |p| some(p.worst_miss_px, significant)),
     ];
     Table::with(points, columns)
 }
@@ -117,11 +117,11 @@ fn errors_table(points: &[Point]) -> Table {
 fn front_table(p: &Precision) -> Table {
     let columns: &[Column<&Point>] = &[
         ("structure", |p| structure(p)),
-        ("culling", |p| culling(&p.errors.names)),
+        ("culling", |p| culling(&p.names)),
         (">query", |p| time_plus_minus(p.time)),
-        (">FP %", |p| percent(p.errors.excess)),
-        (">FN ppm", |p| text::rate(p.errors.false_negative_ppm, 1.0)),
-        (">B/item", |p| text::tenths(p.errors.memory_bytes_per_item)),
+        (">FP %", |p| percent(p.excess)),
+        (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
+        (">B/item", |p| text::tenths(p.memory_bytes_per_item)),
         ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
     ];
     let points = p.front.iter().map(|&i| &p.points[i]);

@@ -10,7 +10,6 @@ use crate::culling::{CameraView, Culling};
 use crate::measure::blamed;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
-use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Truth, scan};
 
 /// Names of a culling: test, arithmetic, planes and epsilon.
@@ -35,28 +34,6 @@ impl Names {
             epsilon: culling.epsilon(),
         }
     }
-}
-
-/// Errors of a culling over all cameras, and what it costs per item.
-#[derive(Clone, Default, Debug, Serialize)]
-pub struct CullingErrors {
-    /// Test, arithmetic and planes.
-    #[serde(flatten)]
-    pub names: Names,
-    /// False positives / visible items, by camera.
-    pub excess: Option<Estimate>,
-    /// Visible items that were not returned, in millionths.
-    pub false_negative_ppm: Option<Estimate>,
-    /// The same as counts; null for what is refused.
-    #[serde(flatten, serialize_with = "counts_or_null")]
-    pub counts: Option<ErrorCount>,
-    /// How deep the deepest false negative reaches into the view, in pixels of a
-    /// view 1080 pixels high.
-    pub worst_miss_px: Option<f64>,
-    /// `query_ns` / number of items.
-    pub ns_per_item: Option<f64>,
-    /// Memory of nodes and items / number of items.
-    pub memory_bytes_per_item: f64,
 }
 
 /// Every count by its name, null where there are none.

@@ -6,9 +6,9 @@ use std::ops::Add;
 
 use serde::Serialize;
 
-use super::judged::{CullingErrors, Judged, Names};
+use super::judged::{Judged, Names, counts_or_null};
 use crate::measure::{OverProcesses, Status, Verdict};
-use crate::statistics::{ALPHA, Estimate, dominance, flat, rate_of, shows_less};
+use crate::statistics::{ALPHA, Estimate, Rate, dominance, flat, rate_of, shows_less};
 use crate::verify::ErrorCount;
 
 /// A kind of error or cost; less is better.
@@ -44,9 +44,23 @@ impl Dimension {
 pub struct Point {
     /// Label of the structure.
     pub structure: String,
-    /// The culling and its errors.
+    /// Test, arithmetic and planes.
     #[serde(flatten)]
-    pub errors: CullingErrors,
+    pub names: Names,
+    /// False positives / visible items, by camera.
+    pub excess: Option<Estimate>,
+    /// Visible items that were not returned, in millionths.
+    pub false_negative_ppm: Option<Estimate>,
+    /// The same as counts; null for what is refused.
+    #[serde(flatten, serialize_with = "counts_or_null")]
+    pub counts: Option<ErrorCount>,
+    /// How deep the deepest false negative reaches into the view, in pixels of a
+    /// view 1080 pixels high.
+    pub worst_miss_px: Option<f64>,
+    /// `query_ns` / number of items.
+    pub ns_per_item: Option<f64>,
+    /// Memory of nodes and items / number of items.
+    pub memory_bytes_per_item: f64,
     /// How building, counting and timing ended.
     pub status: Status,
     /// Why, where the status is not ok.
@@ -77,15 +91,6 @@ impl Point {
         let counts: ErrorCount = judged.iter().map(|camera| camera.counts).sum();
         let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
         let in_pixels = || judged.iter().filter_map(|c| c.worst_miss_px);
-        let errors = CullingErrors {
-            names: Names::of(culling),
-            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
-            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
-            counts: is_judged.then_some(counts),
-            worst_miss_px: in_pixels().reduce(f64::max),
-            ns_per_item: None,
-            memory_bytes_per_item,
-        };
         let of = |count: fn(&ErrorCount) -> u64| {
             Dimension::of(judged.iter().map(|c| count(&c.counts) as f64), f64::add)
         };
@@ -98,7 +103,12 @@ impl Point {
         ];
         Point {
             structure: structure.to_owned(),
-            errors,
+            names: Names::of(culling),
+            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
+            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
+            counts: is_judged.then_some(counts),
+            worst_miss_px: in_pixels().reduce(f64::max),
+            memory_bytes_per_item,
             status: match is_judged {
                 false => Status::Refused,
                 true if counts.false_negatives > 0 => Status::Unsafe,
@@ -123,7 +133,7 @@ impl Point {
         self.accepts(times.failure((way, false)));
         self.time = times.ns((way, false));
         self.way = self.time.map(|_| way);
-        self.errors.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
+        self.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
     }
 
     /// Time of a query, ns.

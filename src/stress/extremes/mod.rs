@@ -112,17 +112,16 @@ impl Extremes<'_> {
         progress: Progress,
         case: impl Fn(u64, u64) -> (String, Findings) + Sync,
     ) -> Vec<Outcome> {
-        let done = Mutex::new(Vec::new());
+        let done = Mutex::new(BTreeMap::new());
         let numbers = (0..cases).take_while(|_| !progress(name));
         threads::share(self.threads, numbers, |nth| {
             let seed = self.seed.wrapping_add(nth);
             let (group, findings) = case(nth, seed);
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-            done.push((nth, (seed, group, findings)));
+            done.insert(nth, (seed, group, findings));
         });
-        let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        done.sort_by_key(|(nth, _)| *nth);
-        done.into_iter().map(|(_, outcome)| outcome).collect()
+        let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+        done.into_values().collect()
     }
 
     /// Adds a row for each fault with its seed, and one for each structure and
