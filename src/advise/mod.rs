@@ -31,7 +31,6 @@ use crate::motion::Motion;
 use crate::statistics::Estimate;
 
 use case::Case;
-use options::planned;
 use rule::{Draft, Facts, Finding, Rule};
 use rules::RULES;
 use rules::stages;
@@ -124,8 +123,7 @@ pub fn prepare(
     progress("answers, checked");
     let answered = trials.answered();
     let tasks = trials.tasks(&answered.answers);
-    let tree = planned(&input.setting.structures, &structures[0]);
-    let funnel = funnel::prepare(&stages::input(input.setting, &tree), progress);
+    let funnel = funnel::prepare(&stages::input(input.setting, &case.spec), progress);
     let funnel = funnel.map_err(|error| error.to_string());
     Ok(Prepared {
         plan: TrialPlan {
@@ -160,8 +158,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
     };
     if let Some(of_stages) = &plan.stages {
-        let tree = planned(&input.setting.structures, &plan.structures[0]);
-        let found = funnel::time(&stages::input(input.setting, &tree), of_stages)?;
+        let found = funnel::time(&stages::input(input.setting, &case.spec), of_stages)?;
         times.ln_ns.extend(found.ln_ns);
     }
     Ok(times)

@@ -46,15 +46,6 @@ pub(super) fn counts_or_null<S: Serializer>(
     serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
 }
 
-/// Errors of the answer to one camera.
-#[derive(Clone, Copy, Default)]
-pub(super) struct CameraErrors {
-    pub counts: ErrorCount,
-    /// How deep the deepest false negative reaches into the view, in pixels of
-    /// 1080p; 0 if there is none, `None` for a matrix without rays.
-    pub worst_miss_px: Option<f64>,
-}
-
 /// Answers of one culling to every camera, and their errors.
 #[derive(Default)]
 pub(super) struct Judged {
@@ -62,7 +53,11 @@ pub(super) struct Judged {
     pub views: Vec<CameraView>,
     /// Ids of each camera that has a truth.
     pub answers: Vec<Vec<ItemId>>,
-    pub by_camera: Vec<CameraErrors>,
+    /// Errors by camera.
+    pub errors: Vec<ErrorCount>,
+    /// How deep the deepest false negative of each camera reaches into the view, in
+    /// pixels of 1080p; 0 if there is none. Matrices without rays have none.
+    pub worst_miss_px: Vec<f64>,
     /// Why there are no such views.
     pub refused: Option<String>,
 }
@@ -84,10 +79,10 @@ impl Judged {
         for ((camera, view), truth) in cameras.iter().zip(&judged.views).zip(truths) {
             let view = view.as_any();
             let answer: Vec<ItemId> = scan(&items, |b| view.sees(b)).collect();
-            judged.by_camera.push(CameraErrors {
-                counts: blamed(culling.test, truth.errors(&scene.items, &answer)),
-                worst_miss_px: worst_miss_px(camera, scene, truth, &answer),
-            });
+            let errors = truth.errors(&scene.items, &answer);
+            judged.errors.push(blamed(culling.test, errors));
+            let worst = worst_miss_px(camera, scene, truth, &answer);
+            judged.worst_miss_px.extend(worst);
             judged.answers.push(answer);
         }
         judged

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::judged::{Judged, Names, counts_or_null};
 use crate::measure::{OverProcesses, Status, Verdict};
-use crate::statistics::{ALPHA, Estimate, Rate, dominance, flat, rate_of, shows_less};
+use crate::statistics::{ALPHA, Estimate, dominance, flat, rate_of, shows_less};
 use crate::verify::ErrorCount;
 
 /// A kind of error or cost; less is better.
@@ -85,36 +85,34 @@ pub struct Point {
 impl Point {
     /// A culling's errors as a point of a structure, without a time.
     pub(super) fn of(judged: &Judged, structure: &str, memory_bytes_per_item: f64) -> Point {
-        let (refused, culling) = (&judged.refused, &judged.culling);
-        let judged = &judged.by_camera[..];
-        let is_judged = refused.is_none();
-        let counts: ErrorCount = judged.iter().map(|camera| camera.counts).sum();
-        let missed = rate_of(judged, |c| [c.counts.false_negatives, c.counts.visible]);
-        let in_pixels = || judged.iter().filter_map(|c| c.worst_miss_px);
+        let (errors, depths) = (&judged.errors[..], &judged.worst_miss_px);
+        let is_judged = judged.refused.is_none();
+        let counts: ErrorCount = errors.iter().copied().sum();
+        let missed = rate_of(errors, |e| [e.false_negatives, e.visible]);
         let of = |count: fn(&ErrorCount) -> u64| {
-            Dimension::of(judged.iter().map(|c| count(&c.counts) as f64), f64::add)
+            Dimension::of(errors.iter().map(|e| count(e) as f64), f64::add)
         };
         let dimensions = vec![
             of(|c| c.false_negatives),
             of(|c| c.touch_dropped),
             of(|c| c.false_positives),
-            Dimension::of(in_pixels(), f64::max),
+            Dimension::of(depths.iter().copied(), f64::max),
             Dimension::fixed(memory_bytes_per_item),
         ];
         Point {
             structure: structure.to_owned(),
-            names: Names::of(culling),
-            excess: rate_of(judged, |c| [c.counts.false_positives, c.counts.visible]),
+            names: Names::of(&judged.culling),
+            excess: rate_of(errors, |e| [e.false_positives, e.visible]),
             false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
             counts: is_judged.then_some(counts),
-            worst_miss_px: in_pixels().reduce(f64::max),
+            worst_miss_px: depths.iter().copied().reduce(f64::max),
             memory_bytes_per_item,
             status: match is_judged {
                 false => Status::Refused,
                 true if counts.false_negatives > 0 => Status::Unsafe,
                 true => Status::Ok,
             },
-            reason: refused.clone(),
+            reason: judged.refused.clone(),
             dimensions,
             ..Point::default()
         }

@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::judged::{Names, counts_or_null};
+use super::judged::{Judged, Names, counts_or_null};
 use super::size::{BATCH, random_camera, strewn};
 use crate::camera::{Camera, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Surroundings};
 use crate::culling::{Arithmetic, Culling, CullingTest};
@@ -89,6 +89,21 @@ pub struct SweepRow {
 }
 
 impl SweepRow {
+    fn of(test: Judged, sweep: Sweep, value: f64) -> SweepRow {
+        let known = test.refused.is_none();
+        let judged = if known { &test.errors[..] } else { &[] };
+        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
+        SweepRow {
+            sweep,
+            value,
+            names: Names::of(&test.culling),
+            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
+            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
+            errors: known.then(|| judged.iter().copied().sum()),
+            refused: test.refused,
+        }
+    }
+
     /// The figure of the row: false positives of sizes, in percent of the visible.
     ///
     /// Missed items of cameras, in millionths.
@@ -106,14 +121,6 @@ impl SweepRow {
 const DEPTH: f64 = 100.0;
 /// Boxes of each camera.
 const BOXES: usize = 500;
-
-/// A culling and its errors.
-struct SweptTest {
-    culling: Culling,
-    /// Errors by camera.
-    errors: Vec<ErrorCount>,
-    refused: Option<String>,
-}
 
 /// The tests by what they add to the faces, in f32 without epsilon.
 ///
@@ -143,40 +150,23 @@ fn tests_of_cameras() -> Vec<Culling> {
     all
 }
 
-impl SweptTest {
-    fn all(sweep: Sweep) -> Vec<SweptTest> {
-        let tests = match sweep {
-            Sweep::Size => tests_of_sizes(),
-            _ => tests_of_cameras(),
-        };
-        let tests = tests.into_iter().map(|culling| SweptTest {
-            culling,
-            errors: Vec::new(),
-            refused: None,
-        });
-        tests.collect()
-    }
-
-    fn row(self, sweep: Sweep, value: f64) -> SweepRow {
-        let known = self.refused.is_none();
-        let judged = if known { &self.errors[..] } else { &[] };
-        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
-        SweepRow {
-            sweep,
-            value,
-            names: Names::of(&self.culling),
-            false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
-            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
-            errors: known.then(|| judged.iter().copied().sum()),
-            refused: self.refused,
-        }
-    }
+/// The tests of a sweep, before any camera is judged.
+fn unjudged(sweep: Sweep) -> Vec<Judged> {
+    let tests = match sweep {
+        Sweep::Size => tests_of_sizes(),
+        _ => tests_of_cameras(),
+    };
+    let tests = tests.into_iter().map(|culling| Judged {
+        culling,
+        ..Judged::default()
+    });
+    tests.collect()
 }
 
 /// Judges `cameras` random cameras at every value with every test; the same
 /// cameras for each.
 pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
-    let mut all = sweep.values().map(|value| (value, SweptTest::all(sweep)));
+    let mut all = sweep.values().map(|value| (value, unjudged(sweep)));
     let mut rng = SeededRng::new(seed);
     match sweep {
         Sweep::Size => {
@@ -203,7 +193,7 @@ pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
     }
     let rows = all.into_iter().flat_map(|(value, tests)| {
         let tests = tests.into_iter();
-        tests.map(move |test| test.row(sweep, value))
+        tests.map(move |test| SweepRow::of(test, sweep, value))
     });
     rows.collect()
 }
@@ -247,7 +237,7 @@ fn boxes_about(rng: &mut SeededRng, camera: &Camera) -> Vec<Aabb> {
     (0..BOXES).map(|_| one(rng)).collect()
 }
 
-fn judge(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [SweptTest]) {
+fn judge(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [Judged]) {
     let Some(truth) = Truth::of_camera(camera, DVec3::ZERO, boxes) else {
         return;
     };
@@ -313,7 +303,7 @@ mod tests {
 
     /// The errors of every test of sizes.
     fn of_cubes(camera: &Camera, cubes: &[Aabb]) -> Vec<ErrorCount> {
-        let mut tests = SweptTest::all(Sweep::Size);
+        let mut tests = unjudged(Sweep::Size);
         judge(camera, cubes, &Surroundings::default(), &mut tests);
         tests.iter().map(|test| test.errors[0]).collect()
     }
