@@ -185,8 +185,7 @@ impl Prepared {
         let of_stages: Vec<ProcessTimes> = of_stages.collect();
         let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
         let motion = (self.motion).map(|motion| motion.chosen(&self.structure, here));
-        let choices = || Facts {
-            check: None,
+        let facts = Facts {
             draw_ns: input.draw_ns,
             structure: &self.structure,
             test: &test,
@@ -195,7 +194,7 @@ impl Prepared {
             funnel: &funnel,
         };
         let rules = self.entered.rules.into_iter();
-        let settled = rules.map(|(rule, draft)| rule.settled(draft, answered, &times, choices()));
+        let settled = rules.map(|(rule, draft)| rule.settled(draft, answered, &times, &facts));
         Advice {
             draw_ns: input.draw_ns,
             processes: processes.len(),

@@ -30,9 +30,8 @@ pub struct Rule {
     pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
 }
 
-/// Facts of a rule: choices, and its own measurement.
+/// Facts of all rules.
 pub struct Facts<'f> {
-    pub check: Option<Check>,
     /// Cost of drawing an item that is not visible, ns.
     pub draw_ns: f64,
     pub structure: &'f StructureChoice,
@@ -43,7 +42,7 @@ pub struct Facts<'f> {
     pub funnel: &'f Result<FunnelReport, String>,
 }
 
-/// Statistic, threshold and reason of a rule, from its facts.
+/// Statistic, threshold and reason of a rule, from the facts.
 #[derive(Clone, Default)]
 pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
@@ -81,19 +80,19 @@ impl Finding {
 /// A rule with its tasks entered, before its times.
 pub struct Draft {
     sides: Option<Sides>,
-    conclude: Box<dyn FnOnce(&Facts) -> Finding>,
+    conclude: Box<dyn FnOnce(&Facts, Option<&Check>) -> Finding>,
 }
 
 impl Draft {
     /// A finding that does not depend on times.
     pub fn new(sides: impl Into<Option<Sides>>, finding: Finding) -> Draft {
-        Draft::concluded(sides, move |_| finding)
+        Draft::concluded(sides, move |_, _| finding)
     }
 
-    /// A finding from the facts.
+    /// A finding from the facts and the rule's own measurement.
     pub fn concluded(
         sides: impl Into<Option<Sides>>,
-        conclude: impl FnOnce(&Facts) -> Finding + 'static,
+        conclude: impl FnOnce(&Facts, Option<&Check>) -> Finding + 'static,
     ) -> Draft {
         Draft {
             sides: sides.into(),
@@ -103,18 +102,17 @@ impl Draft {
 }
 
 impl Rule {
-    /// The omission that follows from the choices and the times.
+    /// The omission that follows from the facts and the times.
     pub fn settled(
         &'static self,
         draft: Draft,
         answered: &Answered,
         times: &OverProcesses,
-        choices: Facts,
+        facts: &Facts,
     ) -> Omission {
         let check = draft.sides.map(|sides| sides.check(answered, times));
-        let facts = Facts { check, ..choices };
-        let finding = (draft.conclude)(&facts);
-        self.omission(finding, facts.check)
+        let finding = (draft.conclude)(facts, check.as_ref());
+        self.omission(finding, check)
     }
 
     /// Weighs statistic, clock and answers; a side that misses more is never taken.

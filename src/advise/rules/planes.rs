@@ -95,7 +95,7 @@ pub(super) fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     });
     let left_out = trials.enter(true, move |n, out| see(kernel, &tree, &volumes[n], out));
     let sides = Sides::new(Wide::INFO.name, kept, left_out);
-    Ok(Draft::concluded(sides, |facts| {
+    Ok(Draft::concluded(sides, |facts, _| {
         match facts.structure.is_scan() {
             true => Finding::none(NO_NODES),
             false => finding,
@@ -153,9 +153,8 @@ impl QueryVolume for Unmasked<'_> {
 pub(super) fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
-    Ok(Draft::concluded(sides, move |facts| {
-        let sides = facts.check.as_ref();
-        let sides = sides.map(|check| [&check.kept, &check.left_out]);
+    Ok(Draft::concluded(sides, move |facts, check| {
+        let sides = check.map(|check| [&check.kept, &check.left_out]);
         let more = sides.and_then(|[exact, six]| {
             Some(six.false_positives_per_query? - exact.false_positives_per_query?)
         });

@@ -41,7 +41,7 @@ const SHADE_NS: f64 = 1.0;
 
 /// A rule about a stage; where the funnel has none it does not apply, for a reason.
 pub(super) fn reads(stage: StageKind) -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, move |facts| {
+    Ok(Draft::concluded(None, move |facts, _| {
         let funnel = facts.funnel.as_ref().map_err(String::clone);
         let found = funnel.and_then(|funnel| finding(funnel, stage, facts.draw_ns));
         found.unwrap_or_else(Finding::none)

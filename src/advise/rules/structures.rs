@@ -22,7 +22,7 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
     let sides = Sides::new(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
-    Ok(Draft::concluded(sides, move |facts| {
+    Ok(Draft::concluded(sides, move |facts, check| {
         let taken = facts.structure;
         // Follows the structure taken, wherever there was a choice.
         let [tree, fastest] = taken.tree_and_scan();
@@ -30,7 +30,7 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
         let ratio = both.and_then(|(tree, scan)| over(tree, scan));
         let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
-        let alone = facts.check.as_ref().filter(|_| costs.is_none());
+        let alone = check.filter(|_| costs.is_none());
         let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
         let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
@@ -78,7 +78,7 @@ pub(super) fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
         .map(|index| trials.index(index, &case.workload.views[..]));
     let sides = Sides::new("octree against quadtree", kept, left_out);
-    Ok(Draft::concluded(sides, move |facts| {
+    Ok(Draft::concluded(sides, move |facts, _| {
         if facts.structure.is_scan() {
             return Finding::none(NO_NODES);
         }
@@ -97,7 +97,7 @@ pub(super) fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
 ///
 /// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly.
 pub(super) fn rebuild() -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, |facts| {
+    Ok(Draft::concluded(None, |facts, _| {
         let Some(motion) = facts.motion else {
             return Finding::none("nothing moves without --motion");
         };
