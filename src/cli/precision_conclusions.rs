@@ -17,8 +17,7 @@ pub fn conclusions(p: &Precision) -> Vec<String> {
 
 /// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
 fn is_safe(point: &&Point) -> bool {
-    let errors = point.counts.unwrap_or_default();
-    let missed = errors.false_negatives + errors.touch_dropped;
+    let missed = point.counts.unwrap_or_default().dropped();
     point.time.is_some() && missed == 0 && point.names.epsilon > 0.0
 }
 

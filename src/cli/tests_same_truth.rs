@@ -85,11 +85,11 @@ fn missed(camera: Camera) -> [bool; 4] {
     let times = precision::time(&setting, 1, &prepared.plan);
     let measured = prepared.conclude(&[times.expect("no refusal")]);
     let by_precision = measured.points.iter().any(|point| {
-        let is_default = point.errors.names.test == "six-plane"
-            && point.errors.names.arithmetic == "f32"
-            && point.errors.names.planes == "frame"
-            && point.errors.names.epsilon > 0.0;
-        is_default && point.errors.counts.is_some_and(|e| e.false_negatives > 0)
+        let is_default = point.names.test == "six-plane"
+            && point.names.arithmetic == "f32"
+            && point.names.planes == "frame"
+            && point.names.epsilon > 0.0;
+        is_default && point.counts.is_some_and(|e| e.false_negatives > 0)
     });
 
     let case = Case::new(

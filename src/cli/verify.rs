@@ -204,7 +204,7 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
             ""
         }
     };
-    if errors.false_negatives + errors.touch_dropped == 0 {
+    if errors.dropped() == 0 {
         return;
     }
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
