@@ -112,10 +112,8 @@ pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
     let said = error.to_string();
     let said = said.split(" at line ").next().unwrap_or_default();
     match error.classify() {
-        Category::Eof => return ("the text ends too early".to_owned(), None),
-        Category::Syntax | Category::Io => {
-            return (format!("no JSON ({})", said.replace('`', "'")), None);
-        }
+        Category::Eof => ("the text ends too early".to_owned(), None),
+        Category::Syntax | Category::Io => (format!("no JSON ({})", said.replace('`', "'")), None),
         Category::Data => in_words(said),
     }
 }

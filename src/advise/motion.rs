@@ -19,7 +19,9 @@ pub struct MotionChoice {
     pub policy_ties: Vec<String>,
     /// Measured policies of the structure, fastest first.
     pub policies: Vec<ReportCell>,
-    /// Policies that are not measured, each with the time of its builds per frame, ns.
+    /// Policies that are not measured, each with its builds / a frame with refits.
+    ///
+    /// Both are from the same processes.
     pub ruled_out: Vec<(String, f64)>,
     /// `false` if the structure is built again in every frame.
     #[serde(skip)]
@@ -45,7 +47,8 @@ impl MotionChoice {
         let rebuilt = spec.zip(structure.rows.first()).and_then(|(spec, row)| {
             let builds = row.value("build_ms").unwrap_or(0.0) * 1e6;
             if builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
-                begun.ruled_out.push(("rebuild".to_owned(), builds));
+                let frames = builds / ns(row).unwrap_or(f64::INFINITY);
+                begun.ruled_out.push(("rebuild".to_owned(), frames));
                 return None;
             }
             Some(format!("{}@rebuild", spec.label))

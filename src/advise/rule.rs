@@ -77,10 +77,13 @@ impl Finding {
     }
 }
 
+/// Maker of a finding, from the facts and the rule's own measurement.
+type Conclude = dyn FnOnce(&Facts, Option<&Check>) -> Finding;
+
 /// A rule with its tasks entered, before its times.
 pub struct Draft {
     sides: Option<Sides>,
-    conclude: Box<dyn FnOnce(&Facts, Option<&Check>) -> Finding>,
+    conclude: Box<Conclude>,
 }
 
 impl Draft {

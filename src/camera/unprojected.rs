@@ -87,7 +87,8 @@ impl ViewProjection {
         })
     }
 
-    /// Returns whether the image is sheared or depth does not run along the axis of view;
+    /// Returns whether the image is sheared, or depth lies off the axis of view.
+    ///
     /// `None` without a lens.
     pub fn is_sheared(&self) -> Option<bool> {
         let found = self.unprojected().ok()?;

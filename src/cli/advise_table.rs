@@ -70,10 +70,10 @@ fn in_motion(advice: &Advice) -> Option<String> {
         let (policy, longer) = (policy_of(&row.structure), times(ns(row)? / frame));
         Some(format!("{policy} takes {longer} as long"))
     });
-    let ruled_out = motion.ruled_out.iter().map(|(policy, builds)| {
-        let longer = times(builds / frame);
-        format!("{policy} at least {longer}, its builds alone")
-    });
+    let ruled_out = motion
+        .ruled_out
+        .iter()
+        .map(|(policy, frames)| format!("{policy} {} by its builds alone", times(*frames)));
     let others: Vec<String> = longer.chain(ruled_out).collect();
     let others = some(others.first(), |_| format!(" ({})", others.join("; ")));
     Some(format!(

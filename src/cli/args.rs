@@ -148,8 +148,7 @@ pub struct RunArgs {
     /// Show every column and every scene and path, in several tables if need be
     #[arg(long)]
     pub all_columns: bool,
-    /// Show a structure beside the best other: nodes, items and planes tested per query,
-    /// and time per test
+    /// Show a structure beside the best other: what a query tests, and time per test
     #[arg(long, value_name = "STRUCTURE", conflicts_with = "plan")]
     pub why: Option<String>,
     /// Print the cells as JSON lines instead of measuring them

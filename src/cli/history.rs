@@ -24,8 +24,7 @@ fn name(report: &Report) -> String {
     name.chars().take(digits).collect::<String>() + dirty
 }
 
-/// Names of the runs, with their start and the digits of their ids where two would be
-/// the same.
+/// Names of the runs; with start and digits of the id where two are the same.
 fn names(reports: &[Report]) -> Vec<String> {
     let started = |run: &usize| {
         let RunInfo { started_at, id, .. } = &reports[*run].run;

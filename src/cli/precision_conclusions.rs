@@ -1,6 +1,8 @@
 //! The sentences that `cullbench precision` ends with: what its figures say, from
 //! the figures alone.
 
+use std::cmp::Ordering;
+
 use super::diagram;
 use super::error_figure::{Measured, against};
 use super::figure::{Figure, ends};
@@ -56,15 +58,19 @@ fn of_points(p: &Precision) -> Vec<String> {
             "Fewer false positives take {times} times as long or more: {name}, {extra}."
         ));
     }
-    let depth = |point: &Point| point.worst_miss_px.unwrap_or(0.0);
     let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
-    let worst = unsafe_.max_by(|a, b| depth(a).total_cmp(&depth(b)));
+    // Cameras without rays have no pixels.
+    let by = |point: &Point| (point.worst_miss_px.unwrap_or(-1.0), missed(point));
+    let worst = unsafe_.max_by(|a, b| by(a).partial_cmp(&by(b)).unwrap_or(Ordering::Equal));
     all.push(match worst {
-        Some(worst) => format!(
-            "Missed items: up to {} pixels deep ({}).",
-            text::significant(depth(worst)),
-            named(worst)
-        ),
+        Some(worst) => match worst.worst_miss_px {
+            Some(depth) => format!(
+                "Missed items: up to {} pixels deep ({}).",
+                text::significant(depth),
+                named(worst)
+            ),
+            None => format!("Items are missed, most by {}.", named(worst)),
+        },
         None if p.points.iter().any(is_wrong) => {
             "Points of right answers missed no visible item on these cameras.".to_owned()
         }

@@ -33,6 +33,8 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let alone = check.filter(|_| costs.is_none());
         let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
+        // Smaller parts are not measured once another structure is ahead.
+        let least = below.map(|turn| turn.upper);
         let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
         let scan_wins = alone.map_or(taken.is_scan(), wins);
         let below = below.filter(|turn| turn.structure == scan && alone.is_none());
@@ -41,12 +43,15 @@ pub(super) fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
             Some(turn) => turn.at,
             None => 0.0,
         };
-        let least = change.map_or(all, |change| change.measured[0]);
+        let least = least.or(change.map(|change| change.measured[0]));
         let reason = match crossing {
             _ if costs.is_none() => format!("by all items alone{place}"),
             // A scan that ties with a tree wins nowhere.
             _ if taken.is_scan() && is_tie == Some(true) => "a scan and a tree tie".to_owned(),
-            0.0 => format!("no scan wins from {} items on", count(least as usize)),
+            0.0 => format!(
+                "no scan wins from {} items on",
+                count(least.unwrap_or(all) as usize)
+            ),
             _ => format!(
                 "a scan wins up to {}",
                 counted(crossing.round() as usize, "item")
@@ -106,7 +111,8 @@ pub(super) fn rebuild() -> anyhow::Result<Draft> {
             ranked.find(|cell| policy_of(&cell.structure) == policy)
         };
         let ruled_out = motion.ruled_out.first();
-        if let Some((&(_, builds), refitted)) = ruled_out.zip(cell("refit").and_then(ns)) {
+        if let Some((&(_, frames), refitted)) = ruled_out.zip(cell("refit").and_then(ns)) {
+            let builds = frames * refitted;
             return Finding {
                 cost_ns: Some([builds, refitted]),
                 ..Finding::new(refitted, builds, "its builds alone")

@@ -248,7 +248,7 @@ fn points_on_the_planes_of_matrices_are_not_lost() {
     println!("points on planes of matrices: {visible} visible, {lost_bare} lost without a margin");
 }
 
-/// A window 0.002 wide whose left plane leans by a component that is subnormal in f32.
+/// A left plane that leans by a component that is subnormal in f32.
 ///
 /// Over 5e37 units along y, its rounding moves the plane by a third of what the box is inside.
 #[test]
