@@ -19,14 +19,13 @@ use libfuzzer_sys::fuzz_target;
 type Reader = fn(&[u8]);
 
 /// Readers by the name of their corpus.
-const READERS: [(&str, Reader); 15] = [
+const READERS: [(&str, Reader); 14] = [
     ("boxes", tables::boxes),
     ("cameras", tables::cameras),
     ("gltf", tables::gltf),
     ("ibsp", maps::ibsp),
     ("obj", tables::obj),
     ("points", tables::points),
-    ("pvs", tables::pvs),
     ("report", runs::report),
     ("samples", runs::samples),
     ("sought", tables::sought),

@@ -1,7 +1,5 @@
 //! Tables and JSON of boxes, cameras, points, regions and test vectors.
 
-use std::fmt::Write;
-
 use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
@@ -9,7 +7,6 @@ use cullbench::scene::{
     LoadOptions, Scene, read_boxes_csv, read_gltf, read_obj, read_sought_boxes_csv, write_boxes_csv,
 };
 use cullbench::stress::{Vector, read_vectors, replay};
-use cullbench::visibility::region::Pvs;
 
 use crate::read;
 
@@ -86,22 +83,6 @@ pub fn cameras(bytes: &[u8]) {
 pub fn points(bytes: &[u8]) {
     let points = read(read_points_csv(bytes, "fuzz.csv"));
     assert!(points.iter().flatten().all(|point| point.is_finite()));
-}
-
-pub fn pvs(bytes: &[u8]) {
-    let Some(pvs) = read(Pvs::from_json(bytes)).filter(|pvs| pvs.len() <= 256) else {
-        return;
-    };
-    let mut text = format!("{{\"regions\":{},\"sees\":[", pvs.len());
-    let all = 0..pvs.len() as u32;
-    let pairs = all
-        .clone()
-        .flat_map(|from| all.clone().map(move |to| (from, to)));
-    for (from, to) in pairs.filter(|&(from, to)| pvs.row(from).contains(&to)) {
-        write!(text, "[{from},{to}],").expect("a String takes everything");
-    }
-    let text = text.trim_end_matches(',').to_owned() + "]}";
-    assert_eq!(Pvs::from_json(text).expect("what was written"), pvs);
 }
 
 pub fn vectors(bytes: &[u8]) {

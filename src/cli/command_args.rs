@@ -89,10 +89,6 @@ pub struct FunnelArgs {
     /// Back end of the fragment stage
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// A potentially visible set for the back end stored-pvs: {"regions": N, "sees":
-    /// [[0, 1], ..]}
-    #[arg(long, value_name = "FILE")]
-    pub pvs: Option<PathBuf>,
     /// Compare every back end of every stage, draw orders and picking too, as --format
     /// json, --csv and --html do
     #[arg(long)]

@@ -5,7 +5,6 @@
 use std::cell::Cell;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -27,33 +26,23 @@ use crate::funnel::{
     self, Chain, Fate, FunnelInput, FunnelReport, NONE, PickRow, StageKind, StageRow,
 };
 use crate::index::{Registry, StructureSpec};
-use crate::input::read_file;
 use crate::measure::{ProcessTimes, Setting};
 use crate::scene::Scene;
 use crate::shown::lines;
 use crate::spec::SpecError;
-use crate::visibility::region::Pvs;
 use crate::visibility::{Guarantee, SampleGrid};
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
-    let mut inputs = vec![Path::new(&args.study.scene), args.study.path.as_ref()];
-    inputs.extend(args.pvs.as_deref());
+    let inputs = [Path::new(&args.study.scene), args.study.path.as_ref()];
     expect_places(&outputs, &inputs)?;
     expect_folder("--csv", args.csv.as_deref())?;
     let setting = setting(registry, args, None)?;
     let input = input(args, &setting)?;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
-    let claimed = args.pvs.is_some() && input.chain.of(StageKind::Region) != "stored-pvs";
-    for (option, is_given, to_see) in [
-        ("--pvs", claimed, " or --region stored-pvs"),
-        ("--no-picks", args.no_picks, ""),
-    ] {
-        if is_given && !input.all {
-            let expected = format!("expected --all{to_see} with it");
-            tell(&format!("note: {option} has no effect; {expected}"));
-        }
+    if args.no_picks && !input.all {
+        tell("note: --no-picks has no effect; expected --all with it");
     }
     let is_begun = Cell::new(false);
     let begin = |step: &str| {
@@ -152,14 +141,6 @@ fn nothing_for_it(scene: &Scene) -> String {
     format!("scene '{}' has nothing for that stage{why}", scene.name)
 }
 
-/// The claim of what is seen from each region that a file holds.
-fn claim(file: Option<&Path>) -> Result<Option<Arc<Pvs>>> {
-    let Some(file) = file else { return Ok(None) };
-    let bytes = read_file(file)?;
-    let pvs = Pvs::from_json(&bytes).with_context(|| file.display().to_string())?;
-    Ok(Some(Arc::new(pvs)))
-}
-
 /// Loads the scene, path and structures of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Setting> {
     let held = |structures| [structures as u64 + 2, funnel::BYTES_PER_TRIANGLE];
@@ -171,7 +152,6 @@ fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'
     let chain = chain(args, &setting.scene, &setting.structures)?;
     Ok(FunnelInput {
         cut_outs: args.cut_out.as_ref(),
-        claim: claim(args.pvs.as_deref())?,
         inner_boxes: args.inner_boxes.map(|most| most as usize),
         all: args.all
             || args.html.is_some()

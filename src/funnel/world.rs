@@ -15,7 +15,7 @@ use crate::kernel::Kernel;
 use crate::measure::{Setting, WorkloadError, input_of};
 use crate::path::evenly;
 use crate::query::ItemId;
-use crate::scene::{self, Dispute, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
+use crate::scene::{self, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
 use crate::shown::{counted, significant};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
@@ -51,8 +51,6 @@ pub struct FunnelInput<'a> {
     pub chain: Chain,
     /// Structures for the object stage; one of them is the chain's.
     pub structures: &'a [StructureSpec],
-    /// Claimed visible regions of each region: a back end of the region stage.
-    pub claim: Option<Arc<Pvs>>,
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
     pub inner_boxes: Option<usize>,
     /// How the scene was read: so are the other levels of its file.
@@ -82,7 +80,6 @@ impl<'a> FunnelInput<'a> {
             cut_outs: None,
             chain,
             structures: &setting.structures,
-            claim: None,
             inner_boxes: None,
             loading: LoadOptions::default(),
             execution,
@@ -345,31 +342,16 @@ fn check_options(input: &FunnelInput) -> Result<()> {
     Ok(())
 }
 
-/// Regions of the scene, with the claimed table.
+/// Regions of the scene.
 fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
-    let (scene, name) = (&input.setting.scene, &input.setting.scene.name);
+    let scene = &input.setting.scene;
     let listed = match &scene.regions {
         scene::Regions::Bsp(map) if !map.reject.is_empty() => map.sectors.len() as u64,
         scene::Regions::Leaves(map) if map.sees().is_some() => map.clusters as u64,
         _ => 0,
     };
-    check_memory(name, BYTES_PER_PAIR * listed.saturating_pow(2))?;
-    match (Regions::of(scene), &input.claim) {
-        (Ok(mut regions), Some(claim)) => {
-            let (own, all) = (claim.len(), regions.graph.len());
-            ensure!(
-                regions.store(claim.clone(), Source::Claim),
-                "--pvs: {}; expected the scene's {all}",
-                counted(own, "region")
-            );
-            Ok(Some(regions))
-        }
-        (regions, None) => Ok(regions.ok()),
-        (Err(None), _) => bail!("'{name}' has no rooms or sectors; expected some for --pvs"),
-        (Err(Some(dispute)), _) => {
-            bail!("'{name}': {dispute}; expected sectors that divide the map for --pvs")
-        }
-    }
+    check_memory(&scene.name, BYTES_PER_PAIR * listed.saturating_pow(2))?;
+    Ok(Regions::of(scene))
 }
 
 /// Rooms of a scene, or sectors or clusters of its map.
@@ -382,43 +364,28 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// Back ends of a scene; `Err` without regions, with the dispute of a map whose
-    /// linedefs contradict each other.
-    pub fn of(scene: &Scene) -> Result<Regions, Option<Dispute>> {
-        let map = DoomMap::of_scene(scene);
-        let graph = Arc::new(match (&map, &scene.regions) {
-            (Some(map), _) => map.graph().map_err(Some)?,
-            (None, scene::Regions::Leaves(map)) => RegionGraph::of_quake(map),
-            (None, _) => RegionGraph::of_scene(scene).ok_or(None)?,
-        });
+    /// Back ends of a scene; `None` without regions, and for a map whose linedefs
+    /// contradict each other.
+    pub fn of(scene: &Scene) -> Option<Regions> {
+        let (graph, source, table) = match (DoomMap::of_scene(scene), &scene.regions) {
+            (Some(map), _) => (map.graph().ok()?, Source::Reject, map.reject()),
+            (None, scene::Regions::Leaves(map)) => (
+                RegionGraph::of_quake(map),
+                Source::Claim,
+                Pvs::of_quake(map),
+            ),
+            (None, _) => (RegionGraph::of_scene(scene)?, Source::PortalRect, None),
+        };
+        let graph = Arc::new(graph);
         let search = Some(RegionRow::search(&graph));
         let search = search.filter(|row| row.back_end.is_for(scene));
-        let mut regions = Regions {
-            rows: Vec::from_iter(search),
+        let stored = |table| RegionRow::stored(source, graph.clone(), Arc::new(table));
+        let stored = table.and_then(stored);
+        Some(Regions {
+            rows: search.into_iter().chain(stored).collect(),
             items: RegionItems::of(&graph, scene),
             graph,
-        };
-        if let Some(reject) = map.and_then(|map| map.reject()) {
-            regions.store(Arc::new(reject), Source::Reject);
-        }
-        if let scene::Regions::Leaves(map) = &scene.regions
-            && let Some(seen) = Pvs::of_quake(map)
-        {
-            regions.store(Arc::new(seen), Source::Claim);
-        }
-        Ok(regions)
-    }
-
-    /// Adds a table, a claimed one in place of the map's own.
-    ///
-    /// False if it has another number of regions.
-    fn store(&mut self, pvs: Arc<Pvs>, source: Source) -> bool {
-        let row = RegionRow::stored(source, self.graph.clone(), pvs);
-        let fits = row.is_some();
-        self.rows
-            .retain(|row| row.back_end.build != source || !fits);
-        self.rows.extend(row);
-        fits
+        })
     }
 
     /// The back end of a name.

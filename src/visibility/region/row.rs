@@ -1,18 +1,13 @@
 //! The back ends of the region stage: their table, and each over a graph.
 //!
-//! Pairs of regions that may see each other are a set per region, as a file claims.
+//! Pairs of regions that may see each other are a set per region, as a map claims.
 
 use std::sync::Arc;
-
-use serde::Deserialize;
 
 use super::graph::{RegionGraph, RegionId};
 use super::search::Search;
 use crate::index::IdSet;
-use crate::input::{InputError, Result};
-use crate::json::from_json;
 use crate::kernel::extend;
-use crate::query::distinct;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays, Row};
 
@@ -26,59 +21,10 @@ pub struct Pvs {
     rows: Box<[Box<[RegionId]>]>,
 }
 
-const FORM: &str = "{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}";
-
-/// Its form in a file: ordered pairs.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Written {
-    regions: usize,
-    sees: Vec<[RegionId; 2]>,
-}
-
 /// Most regions of a set.
 const MOST_REGIONS: usize = 1 << 16;
 
 impl Pvs {
-    /// Regions seen from each region, which sees itself too.
-    fn of(rows: Vec<Vec<RegionId>>) -> Pvs {
-        let row = |(mut row, own): (Vec<RegionId>, RegionId)| {
-            row.push(own);
-            distinct(row).into_boxed_slice()
-        };
-        Pvs {
-            rows: rows.into_iter().zip(0..).map(row).collect(),
-        }
-    }
-
-    /// Reads `{"regions": COUNT, "sees": [[FROM, TO], ...]}`; each region sees
-    /// itself, whether that is written or not.
-    ///
-    /// # Errors
-    /// Other JSON, or a region that is not there.
-    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Pvs> {
-        let written: Written = from_json(text.as_ref()).map_err(|error| {
-            let (place, expected, found) = (error.place(), error.expected_of(FORM), error.found);
-            InputError::new(format_args!("{place}: {found}; expected {expected}"))
-        })?;
-        let regions = written.regions;
-        if regions > MOST_REGIONS {
-            let found = format_args!("{regions} regions; expected at most {MOST_REGIONS}");
-            return Err(InputError::new(found));
-        }
-        let mut rows = vec![Vec::new(); regions];
-        for (pair, [from, to]) in written.sees.into_iter().enumerate() {
-            let region = from.max(to);
-            if region as usize >= regions {
-                return Err(InputError::new(format_args!(
-                    "pair {pair}: region {region} is out of range; expected less than {regions}"
-                )));
-            }
-            rows[from as usize].push(to);
-        }
-        Ok(Pvs::of(rows))
-    }
-
     /// The REJECT table of a Doom map: bit `from * sectors + to`, lowest bit of a
     /// byte first, is 1 where a monster in sector `from` cannot see sector `to`.
     ///
@@ -97,8 +43,14 @@ impl Pvs {
     /// `None` for too many regions.
     pub fn of_pairs(regions: usize, sees: impl Fn(u32, u32) -> bool) -> Option<Pvs> {
         let all = 0..regions as u32;
-        let row = |from| all.clone().filter(|&to| sees(from, to)).collect();
-        (regions <= MOST_REGIONS).then(|| Pvs::of(all.clone().map(row).collect()))
+        let row = |from| {
+            all.clone()
+                .filter(|&to| from == to || sees(from, to))
+                .collect()
+        };
+        (regions <= MOST_REGIONS).then(|| Pvs {
+            rows: all.clone().map(row).collect(),
+        })
     }
 
     /// Number of regions.
@@ -124,7 +76,7 @@ pub type BackEnd = Row<Source>;
 pub enum Source {
     /// A search with rectangles of the image.
     PortalRect,
-    /// Pairs of regions read from a file, or the table of a Quake III map.
+    /// The table of a Quake III map.
     Claim,
     /// The REJECT table of a map.
     Reject,
@@ -135,7 +87,7 @@ pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, build, guarantee, summ
     "portal-rect", Source::PortalRect, Guarantee::Conservative,
         "rectangles of the image, intersected from opening to opening";
     "stored-pvs", Source::Claim, Guarantee::Unproven,
-        "the row of the eye's region in a set of pairs, the map's own or read from a file";
+        "the row of the eye's region in the map's own table";
     "reject", Source::Reject, Guarantee::Unproven,
         "the row of the eye's sector in the map's REJECT table";
 };
@@ -144,9 +96,8 @@ impl BackEnd {
     /// Tests whether a scene has the regions that the back end needs.
     pub fn is_for(&self, scene: &Scene) -> bool {
         match (&scene.regions, self.build) {
-            (Regions::Tiling(_), source) => source != Source::Reject,
-            (Regions::Leaves(_), source) => source == Source::Claim,
-            (Regions::Bsp(map), _) => map.disputes().is_empty(),
+            (Regions::Tiling(_), Source::PortalRect) | (Regions::Leaves(_), Source::Claim) => true,
+            (Regions::Bsp(map), Source::PortalRect | Source::Reject) => map.disputes().is_empty(),
             _ => false,
         }
     }
@@ -226,26 +177,6 @@ impl RegionRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pairs_are_read_and_each_region_sees_itself() {
-        let pvs = Pvs::from_json(r#"{"regions":70,"sees":[[3,69],[69,4],[3,69]]}"#).unwrap();
-        assert_eq!((pvs.row(3), pvs.row(69)), (&[3, 69][..], &[4, 69][..]));
-        assert_eq!(pvs.row(5), [5]);
-        assert_eq!(pvs.len(), 70);
-    }
-
-    #[test]
-    fn other_files_are_typed_errors() {
-        let error = |text: &str| Pvs::from_json(text).unwrap_err().to_string();
-        assert!(error("[]").contains("expected {\"regions\""));
-        assert!(
-            error(r#"{"regions":2,"sees":[[0,2]]}"#)
-                .contains("pair 0: region 2 is out of range; expected less than 2")
-        );
-        assert!(error(r#"{"regions":1,"sees":[],"more":1}"#).contains("more"));
-        assert!(error(r#"{"regions":99999,"sees":[]}"#).contains("at most 65536"));
-    }
 
     #[test]
     fn a_reject_bit_hides_and_bits_run_on_over_rows() {
