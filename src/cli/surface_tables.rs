@@ -73,28 +73,6 @@ fn two_digits(items: f64) -> usize {
     ((items / unit).round() * unit) as usize
 }
 
-/// After how many queries each build is repaid against the linear scan.
-fn break_even(surface: &Surface) -> Option<Table> {
-    let structures = surface.no_scans();
-    let told = |place: &Place, structure: &str| {
-        let cell = place.cell(structure);
-        match cell.map(|c| c.value("break_even_queries")) {
-            None => String::new(),
-            Some(Some(queries)) => text::count(queries as usize),
-            Some(None) => "never".to_owned(),
-        }
-    };
-    let mut table = Table::of_numbers(["items, visible"].iter().chain(&structures).copied());
-    for place in &surface.places {
-        let (items, visible) = (text::count(place.items), text::short_percent(place.share));
-        let name = [format!("{items}, {visible}")].into_iter();
-        table.add_row(name.chain(structures.iter().map(|structure| told(place, structure))));
-    }
-    let mut places = surface.places.iter();
-    let is_known = places.any(|place| place.cell(YARDSTICK).is_some());
-    (is_known && !structures.is_empty()).then_some(table)
-}
-
 /// Crossovers and growth of a report, in tables and figures; a surface has as many
 /// `sizes`, or one size and several shares.
 pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
@@ -117,11 +95,6 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
         )));
         blocks.push(Block::Table(winners(surface)));
         blocks.extend(crossings(surface).map(Block::Table));
-        if let Some(rows) = break_even(surface) {
-            let line = "Queries after which the build pays off against the linear scan (never: not \
-                        faster, or not shown to be):";
-            blocks.extend([Block::line(line), Block::Table(rows)]);
-        }
         let figures = growth(surface).into_iter();
         blocks.extend(figures.map(|figure| Block::Figure(figure.1)));
     }
