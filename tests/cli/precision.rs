@@ -353,7 +353,7 @@ fn f32_matrices_lose_what_the_frame_keeps() {
     let names: Vec<&str> = values.keys().copied().collect();
     assert_eq!(
         names,
-        ["aspect", "far/near", "fov", "offset", "scale", "size", "up"]
+        ["aspect", "far/near", "fov", "offset", "scale", "size"]
     );
     assert!(values.values().all(|values| values.len() == 5));
     let row = |sweep: &str, planes: &str, epsilon: f64, value: f64| {
