@@ -202,7 +202,7 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
         Command::List(args) => list::list(registry, &args),
         Command::Run(args) => run::run(registry, &args),
         Command::Merge(args) => merge::merge(&args),
-        Command::Report(args) => report::report(registry, &args),
+        Command::Report(args) => report::report(&args),
         Command::Compare(args) => compare::compare(registry, &args),
         Command::Query(args) => query::query(registry, &args),
         Command::Locate(args) => query::locate(registry, &args),

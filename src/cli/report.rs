@@ -16,13 +16,12 @@ use super::{
     Ending, bencher, expect_folder, expect_places, history, program, run_figures, run_plan,
     run_table, surface_tables, tell, text, write_if, write_text,
 };
-use crate::index::Registry;
 use crate::report::{
     Comparison, Overall, Report, Views, comparisons, folder_of, grouped, read_report, save_page,
     views,
 };
 
-pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
+pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     let outputs = [
         ("--markdown", &args.markdown),
         ("--html", &args.html),
@@ -42,8 +41,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
         let count = args.reports.len();
         bail!("{count} reports; expected one, or --history FILE");
     };
-    let mut report = read_report(path)?;
-    declare(&mut report, registry);
+    let report = read_report(path)?;
     let markdown = || to_markdown(&blocks(&report, &BTreeMap::new()));
     write_if(&args.markdown, markdown)?;
     if let Some(path) = &args.bencher {
@@ -87,18 +85,6 @@ fn page(report: &Report, folder: &Path, why: Vec<Block>) -> String {
 pub fn write_page(report: &Report, folder: &Path, why: Vec<Block>) -> anyhow::Result<()> {
     let pictures = surface_tables::pictures(report);
     Ok(save_page(folder, &page(report, folder, why), &pictures)?)
-}
-
-/// Older reports do not say what their structures are: the registry does, where
-/// it has one of the very same name.
-fn declare(report: &mut Report, registry: &Registry) {
-    for cell in &mut report.cells {
-        let name = cell.structure.split(':').next().unwrap_or_default();
-        if let (None, Some(row)) = (cell.kind, registry.named(name)) {
-            cell.kind = Some(row.info.kind);
-            cell.origin = Some(row.info.origin.owned());
-        }
-    }
 }
 
 /// All of them, or no folder that was not there before.

@@ -26,7 +26,7 @@ pub struct ReportCell {
     pub path: PathInfo,
     /// Label of the structure or name of the bound.
     pub structure: String,
-    /// Kind that the structure declares; null for a bound and in older reports.
+    /// Kind that the structure declares; null for a bound.
     pub kind: Option<Kind>,
     /// Likewise.
     pub origin: Option<Origin>,

@@ -343,30 +343,6 @@ fn figures_beyond_any_axis_end_and_are_left_out() {
     }
 }
 
-/// Reports from before structures declared what they are: the registry knows
-/// those that it has.
-#[test]
-fn reports_that_do_not_say_what_a_structure_is_read_as_before() {
-    let folder = folder(&[]);
-    let line = "run --scene uniform:n=300 --scene uniform:n=900 --path orbit:frames=4 \
-        --structure linear,bvh --no-bounds --out run";
-    works(folder.path(), line);
-    let told = works(folder.path(), "report run");
-    let text = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
-    let mut report = json(&text);
-    for cell in report["cells"].as_array_mut().expect("cells") {
-        let cell = cell.as_object_mut().expect("a cell");
-        assert!(cell.remove("kind").is_some() && cell.remove("origin").is_some());
-    }
-    fs::write(folder.path().join("old.json"), report.to_string()).expect("writable");
-    assert_eq!(works(folder.path(), "report old.json"), told);
-    // The scan has nothing to repay: no column of its own.
-    assert!(
-        !told.contains("| linear | <=") && !told.contains("| linear | >"),
-        "{told}"
-    );
-}
-
 #[test]
 fn what_is_no_report_is_refused() {
     let folder = folder(&[
