@@ -10,7 +10,6 @@ use crate::shown::plain;
 
 /// Difference of a text from the JSON that was expected.
 #[derive(Clone, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct JsonError {
     /// Line, from 1; the reader of a file of several texts sets it to that of the file.
     pub line: usize,

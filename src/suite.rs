@@ -18,7 +18,6 @@ use crate::spec::SpecError;
 
 /// A named set of scenes and paths with the time to spend on them.
 #[derive(Clone, Deserialize)]
-#[non_exhaustive]
 pub struct Suite {
     /// Value of `--suite`.
     pub name: String,

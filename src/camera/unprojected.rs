@@ -19,7 +19,6 @@ const SYMMETRIC: f64 = 1e-6;
 
 /// A view-projection matrix as a frame and a lens, rounded.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Unprojected {
     /// The camera without a matrix. The eye of an orthographic lens is the centre of
     /// the near plane.

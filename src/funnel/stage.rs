@@ -18,7 +18,6 @@ named! {
     /// A stage that takes candidates and returns fewer of them.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    #[non_exhaustive]
     pub enum StageKind {
         /// Rooms that can be seen into, and so items.
         Region = "region",

@@ -95,7 +95,6 @@ impl MemoryUsage {
 /// Items are numbered by their index in the slice. An empty box of finite numbers (min > max),
 /// such as [`REMOVED`](crate::motion::REMOVED), is an item that no query ever returns.
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub struct Input<'a> {
     /// The bounds of all items.
     pub items: &'a [Aabb],

@@ -29,7 +29,6 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
 
 /// Work of a frame after items have moved.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
-#[non_exhaustive]
 pub enum UpdatePolicy {
     /// A refit; a new build only where the structure cannot refit.
     #[default]

@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 /// assert!(INFO.refits && !INFO.ranges);
 /// ```
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct Info {
     /// Name on the command line; unique in a registry.
     pub name: &'static str,

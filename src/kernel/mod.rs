@@ -32,7 +32,6 @@ named! {
     /// An instruction set that queries are compiled for, from the smallest to the
     /// largest.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-    #[non_exhaustive]
     pub enum Kernel {
         /// Plain arrays: whatever vectors the compiler makes of them, SSE2 or NEON.
         Portable = "portable",

@@ -9,7 +9,6 @@ use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 
 /// A row of the table of bounds.
-#[non_exhaustive]
 pub struct Bound {
     /// Name in `list metrics` and in reports: `bound-read`.
     pub name: &'static str,

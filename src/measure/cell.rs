@@ -18,7 +18,6 @@ use crate::statistics::Estimate;
 /// A structure, or a lower bound, on one scene, path and test.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct ReportCell {
     /// The scene.
     pub scene: SceneInfo,
@@ -62,7 +61,6 @@ pub struct ReportCell {
 /// The cell's rows in samples.csv: those that have its names.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct SamplesRef {
     /// Name of the file, beside the report.
     pub file: String,
@@ -73,7 +71,6 @@ pub struct SamplesRef {
 /// Basis of the times of a cell.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct CellTimes {
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
@@ -127,7 +124,6 @@ impl Metric {
 /// A structure that was entered twice, with what its two times say.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct TwinEntry {
     /// Name of the scene.
     pub scene: String,
@@ -201,7 +197,6 @@ impl ReportCell {
 /// The scene of a cell.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct SceneInfo {
     /// File name or spec.
     pub name: String,
@@ -256,7 +251,6 @@ impl SceneInfo {
 /// The queries of a cell.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct PathInfo {
     /// File name or spec.
     pub name: String,

@@ -43,7 +43,6 @@ impl Answer {
 
 /// Answers of one subject, and their cost.
 #[derive(Clone, Default, Debug)]
-#[non_exhaustive]
 pub struct Counted {
     /// Ok if every answer is that of the reference scan.
     pub verdict: Verdict,
@@ -150,7 +149,6 @@ fn compare_batch(workload: &Workload, subject: &Built) -> Result<(), Verdict> {
 /// Difference of the answers of a workload from the truth at camera level.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Judged {
     /// Cameras that were judged, evenly spread over the path.
     pub judged_queries: usize,

@@ -13,7 +13,6 @@ use crate::scene::hex;
 /// The machine of a run; what the system does not tell is `None`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Machine {
     /// Model name of the processor.
     pub cpu: Option<String>,
@@ -38,7 +37,6 @@ pub struct Machine {
 /// One cache of a processor core.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Cache {
     /// 1 is the innermost.
     pub level: u32,
@@ -49,7 +47,6 @@ pub struct Cache {
 /// Compiler and settings of the build; a fact that is not known is `None`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Toolchain {
     /// `rustc --version`.
     pub rustc: Option<String>,
@@ -70,7 +67,6 @@ pub struct Toolchain {
 /// Source of the build.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Source {
     /// Version of this crate.
     pub version: String,

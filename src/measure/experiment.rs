@@ -42,7 +42,6 @@ pub struct Effort {
 /// Measurements beside frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum Extras {
     /// Frustum queries only.
     Nothing,

@@ -59,7 +59,6 @@ named! {
     /// Kind of query.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    #[non_exhaustive]
     pub enum TaskKind {
         /// Frustum query: the items that the camera sees.
         Query = "query",

@@ -5,7 +5,6 @@ use super::{Judged, TaskKind};
 use crate::statistics::Estimate;
 
 /// One metric of the list; the unit is part of its name where it has one.
-#[non_exhaustive]
 pub struct MetricInfo {
     /// Name in reports and for `--metric`.
     pub name: &'static str,

@@ -18,7 +18,6 @@ use super::{
 
 /// Results of one process for one group of cells.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct Part {
     /// Key of the group.
     pub key: GroupKey,
@@ -47,7 +46,6 @@ pub struct Part {
 
 /// Results of one structure in one process; its query times are in [`TaskPart`]s.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct SubjectPart {
     /// Label on the command line, `bvh:leaf=4`; the twin of one ends in `#twin`.
     pub label: String,
@@ -83,7 +81,6 @@ pub struct SubjectPart {
 
 /// Times of one task of a structure or a lower bound in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct TaskPart {
     /// Label of a structure or a lower bound.
     pub label: String,
@@ -103,7 +100,6 @@ pub struct TaskPart {
 
 /// Right answers and schedules of the first process, which all others use.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct Known {
     /// Right answer of the frustum query of every camera.
     ///

@@ -24,7 +24,6 @@ pub const YARDSTICK: &str = "linear";
 const LEAST_READINGS: usize = 3;
 
 /// All cells of a group, and the results of lower bounds and the twin.
-#[non_exhaustive]
 pub struct Group {
     /// Cells of the structures, in the order of the plan.
     pub cells: Vec<ReportCell>,

@@ -52,7 +52,6 @@ const PILOT: usize = 24;
 /// The plan of one timed pass.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Schedule {
     /// Cameras of the path that are timed, by their index.
     pub cameras: Vec<u32>,
@@ -67,7 +66,6 @@ pub struct Schedule {
 /// How one task takes part.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct TaskPlan {
     /// Queries per clock reading.
     pub batch: u32,

@@ -20,7 +20,6 @@ const WARM_UP: Duration = Duration::from_millis(2);
 
 /// One clock reading: `queries` consecutive timed cameras from `frame` on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct Sample {
     /// Number of the round, from 0.
     pub round: u32,
@@ -38,7 +37,6 @@ pub struct Sample {
 
 /// The samples of one task, rounds in order, cameras in order.
 #[derive(Clone, Default, Debug)]
-#[non_exhaustive]
 pub struct Timed {
     /// All clock readings of the task.
     pub samples: Vec<Sample>,

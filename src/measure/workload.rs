@@ -58,7 +58,6 @@ pub struct Workload<'a> {
 /// A camera of a path that has no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{place}: {error}")]
-#[non_exhaustive]
 pub struct WorkloadError {
     /// Place in the path ([`CameraPath::place`]), or the motion that goes too far.
     pub place: String,

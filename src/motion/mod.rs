@@ -23,7 +23,6 @@ use laws::{Law, World};
 use recorded::Recorded;
 
 /// A kind of motion.
-#[non_exhaustive]
 pub struct MotionFamily {
     /// Name on the command line.
     pub name: &'static str,

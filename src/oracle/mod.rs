@@ -29,7 +29,6 @@ pub enum Verdict {
 
 /// A verdict and whether it could be proved.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct Judgement {
     /// The verdict, as far as it could be proved.
     pub verdict: Verdict,

@@ -14,7 +14,6 @@ use crate::shown::{counted, significant};
 /// Lenses of all cameras. Pairs are the least and the largest value.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct CameraFacts {
     /// Vertical field of view, degrees; null where all lenses are orthographic.
     pub fovy_deg: Option<[f64; 2]>,
@@ -33,7 +32,6 @@ pub struct CameraFacts {
 /// First matrix of a path, taken apart.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct MatrixFacts {
     /// Name of the convention.
     pub convention: String,

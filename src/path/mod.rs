@@ -121,7 +121,6 @@ pub fn digest(cameras: &[Camera]) -> String {
 }
 
 /// A kind of path.
-#[non_exhaustive]
 pub struct PathFamily {
     /// Name on the command line.
     pub name: &'static str,

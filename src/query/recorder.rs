@@ -30,7 +30,6 @@ impl Recorder for NoRecorder {}
 
 /// Cost of one query, or of a sum of queries.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct QueryCost {
     /// Node bounds that were classified.
     pub nodes_tested: u64,

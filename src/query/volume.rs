@@ -266,7 +266,6 @@ impl QueryVolume for Aabb {
 /// Any volume for an erased structure. Dispatched once per query, never per node.
 /// A box becomes one by [`ConvexVolume::of_box`].
 #[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
 pub enum AnyVolume<'a> {
     /// THE plane test in f32.
     Planes(&'a ConvexVolume),

@@ -41,7 +41,6 @@ named! {
     /// Outcome of a cell, worst first.
     #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
-    #[non_exhaustive]
     pub enum Outcome {
         /// Was right and is wrong, unsafe or panics.
         Broken = "broken",
@@ -104,7 +103,6 @@ impl From<Change> for Outcome {
 
 /// A cell of a comparison, by one metric or as a whole.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct JudgedRow {
     /// Slower, faster, same, or why it cannot be said.
     #[serde(rename = "verdict")]
@@ -168,7 +166,6 @@ impl JudgedRow {
 
 /// A counter that is not what it was.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct WorkChange {
     /// The cell in both reports.
     #[serde(flatten)]
@@ -183,7 +180,6 @@ pub struct WorkChange {
 
 /// A cell that the other report does not have.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Lone {
     /// The cell in the report that has it.
     #[serde(flatten)]
@@ -196,7 +192,6 @@ pub struct Lone {
 
 /// Shift of all structures at once: the machine, or the program as a whole.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct CommonShift {
     /// Metric whose times are compared.
     pub metric: &'static str,
@@ -212,7 +207,6 @@ pub struct CommonShift {
 
 /// A comparison: every cell with its verdict, and what else is to be said.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Changes {
     /// 0.05 is 5 %: how finely "same" is to be shown.
     pub threshold: f64,

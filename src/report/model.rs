@@ -13,7 +13,6 @@ pub const SCHEMA_VERSION: u32 = 2;
 /// The contents of report.json: a run, what it ran on, and its cells.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Report {
     /// Raised when a field changes its meaning or goes away.
     pub schema_version: u32,
@@ -55,7 +54,6 @@ impl Report {
 /// A run as a whole.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct RunInfo {
     /// The start in UTC and four random digits.
     pub id: String,
@@ -91,7 +89,6 @@ fn one() -> u32 {
 /// How far apart two measurements of the same thing lie in this run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct Noise {
     /// Geometric mean of all twin ratios: 1 unless the order is unfair.
     pub aa_ratio: Option<f64>,

@@ -20,7 +20,6 @@ use crate::statistics::{geometric_mean, two_speeds};
 /// A line of stream.jsonl.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum Line<'l> {
     /// The first line: everything about the run but its cells.
     Run(&'l Header),
@@ -35,7 +34,6 @@ pub enum Line<'l> {
 
 /// Place, program and options of a run.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct Header {
     /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the program that wrote it.
     pub schema_version: u32,
@@ -157,7 +155,6 @@ impl Header {
 
 /// A part with what samples.csv holds up to its end.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct KeptPart {
     /// Results of the process.
     pub part: Part,
@@ -169,7 +166,6 @@ pub struct KeptPart {
 
 /// Everything that a stream holds.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Stream {
     /// The first line.
     pub header: Header,

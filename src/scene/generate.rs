@@ -17,7 +17,6 @@ pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
 #[derive(Clone, Copy)]
-#[non_exhaustive]
 pub struct Family {
     /// Name as typed: `city`, `mesh:statue`.
     pub name: &'static str,

@@ -143,7 +143,6 @@ impl WorldBox {
 
 /// The regions of a scene, numbered from zero: the targets of region search.
 #[derive(Clone, Default, Debug)]
-#[non_exhaustive]
 pub enum Regions {
     /// The items themselves, closed boxes that may overlap: a point belongs
     /// to every one that holds it.

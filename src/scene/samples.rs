@@ -12,7 +12,6 @@ use serde::Deserialize;
 use crate::shown::hex;
 
 /// A real scene that is part of the program.
-#[non_exhaustive]
 pub struct Sample {
     /// Name as typed.
     pub name: &'static str,
@@ -63,7 +62,6 @@ const FOLDER: &str = "datasets/fetched";
 
 /// A file with real scenes that is fetched and not part of the program.
 #[derive(Deserialize)]
-#[non_exhaustive]
 pub struct Fetched {
     /// Name for `scripts/fetch.py`.
     pub name: String,

@@ -17,7 +17,6 @@ use crate::spec::SpecError;
 named! {
     /// Effect of a surface on a ray.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-    #[non_exhaustive]
     pub enum SurfaceKind {
         /// It ends there.
         Opaque = "opaque",
@@ -32,7 +31,6 @@ named! {
 /// Triangles, item by item. Coordinates are f32 about an f64 origin; corners are
 /// counter-clockwise as seen from the outside.
 #[derive(Clone, Debug, Default)]
-#[non_exhaustive]
 pub struct Surfaces {
     /// Zero of `points`, in the world.
     pub origin: DVec3,
@@ -351,7 +349,6 @@ pub(crate) fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
 named! {
     /// Content of the box of an item.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-    #[non_exhaustive]
     pub enum ItemShape {
         /// The box itself, solid.
         Box = "solid boxes",

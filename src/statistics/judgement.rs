@@ -46,7 +46,6 @@ named! {
     /// How the new times stand to the old.
     #[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    #[non_exhaustive]
     pub enum Change {
         /// Longer: proven, and by more than the floor.
         Slower = "slower",
@@ -62,7 +61,6 @@ named! {
 
 /// The verdict on one cell, with the figures it rests on.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
 pub struct Judgement {
     /// Slower, faster, same or inconclusive.
     pub change: Change,

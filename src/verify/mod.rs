@@ -27,7 +27,6 @@ pub fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> impl Iterator<Item 
 
 /// How a structure's answer differs from the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
-#[non_exhaustive]
 pub struct Difference {
     /// Wanted by the reference, not returned (false negatives).
     pub missing: usize,

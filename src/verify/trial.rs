@@ -10,7 +10,6 @@ use crate::query::{AnyVolume, ItemId};
 
 /// A fault of an answer.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub enum Fault {
     /// The structure panicked; its message.
     Panicked(String),

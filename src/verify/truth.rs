@@ -27,7 +27,6 @@ pub struct Truth {
 /// from a false negative.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
 pub struct ErrorCount {
     /// Items that are in or touch.
     #[serde(rename = "visible_count")]

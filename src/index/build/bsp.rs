@@ -27,7 +27,6 @@ pub struct BspBuilder;
 /// Source of the dividing planes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum PlaneSource {
     /// `import` if the scene has its own tree, else `median`.
     Auto,

@@ -51,7 +51,6 @@ const COLLAPSE_COST: f32 = 30.0;
 /// The presets of obvhs by their own names.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
 pub enum BvhPreset {
     /// `BvhBuildParams::fastest_build`: the quickest build, the worst tree.
     Fastest,

@@ -17,7 +17,6 @@ use crate::threads::share;
 /// Order of the items of an implicit tree.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[non_exhaustive]
 pub enum BlockOrder {
     /// Recursive halving at the median of the widest axis, always at a multiple of
     /// the block size of the halves.

@@ -20,7 +20,6 @@ pub struct AutoParams {
 /// Structure that [`Auto`] is to be.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[non_exhaustive]
 pub enum Use {
     /// The cheapest of a scan and a tree.
     #[default]
@@ -36,7 +35,6 @@ pub enum Use {
 /// Work of [`Auto`] after items have moved.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[non_exhaustive]
 pub enum Update {
     /// The cheapest.
     #[default]
