@@ -1,4 +1,4 @@
-//! Tables and JSON of boxes, cameras, points, regions and test vectors.
+//! Tables and JSON of boxes, cameras, points, test vectors.
 
 use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;

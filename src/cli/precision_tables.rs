@@ -106,7 +106,10 @@ fn errors_table(points: &[Point]) -> Table {
     points.sort_by_key(|p| (p.names.test, culling(&p.names)));
     let columns: &[Column<&Point>] = &[
         ("culling", |p| culling(&p.names)),
-        (">FP %", |p| percent(p.excess)),
+        (">FP %", |p| match p.counts {
+            None => p.status.name().to_owned(),
+            Some(_) => percent(p.excess),
+        }),
         (">by source", |p| some(p.counts, text::sources)),
         (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
         (">px", |p| some(p.worst_miss_px, significant)),

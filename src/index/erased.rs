@@ -61,7 +61,7 @@ impl FromStr for UpdatePolicy {
             ("rebuild", _) => Ok(UpdatePolicy::Rebuild),
             (_, Some(frames @ 2..=1_000_000)) => Ok(UpdatePolicy::Every(frames)),
             _ => Err(SpecError::new(format_args!(
-                "--update '{text}'; expected refit, rebuild or every=N (frames, at least 2)"
+                "--update '{text}'; expected refit, rebuild or every=N (frames, 2 to 1,000,000)"
             ))),
         }
     }

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::{Report, ReportCell};
-use crate::measure::{CellTimes, GroupKey, Judged, Metric, YARDSTICK};
+use crate::measure::{CellTimes, GroupKey, Judged, Metric, Status, YARDSTICK};
 use crate::statistics::{ALPHA, Estimate, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
@@ -26,6 +26,18 @@ pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
         bounds: (report.bounds.iter().filter(|b| group(b) == wanted)).collect(),
     };
     grouped(cells).into_iter().map(comparison).collect()
+}
+
+/// Takes the ranks of cells that may not be compared by their times.
+///
+/// Those without a time, and those among no items, where nothing is found faster.
+pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
+    for cell in cells {
+        let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
+        let is_timed = cell.time().is_some_and(|time| is_time(time.value));
+        let is_sound = is_timed && cell.scene.total_count > 0 && cell.status == Status::Ok;
+        cell.rank = cell.rank.filter(|_| is_sound);
+    }
 }
 
 /// Cells in the order of the ranks from the run, the faster first within a

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::ranking::without_false_ranks;
 use super::stream::{Header, KeptPart, Stream};
 use super::writing::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::{Report, ReportCell, SCHEMA_VERSION};
@@ -47,7 +48,8 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
     if schema_version != SCHEMA_VERSION {
         return Err(writing::version(&path, schema_version));
     }
-    let report: Report = from_json(&bytes).map_err(bad)?;
+    let mut report: Report = from_json(&bytes).map_err(bad)?;
+    without_false_ranks(&mut report.cells);
     let mut seen = BTreeSet::new();
     let mut keys = report.cells.iter().map(ReportCell::key);
     if let Some(twice) = keys.find(|key| !seen.insert((key.group.id(), key.structure.clone()))) {

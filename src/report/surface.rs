@@ -144,7 +144,7 @@ impl Surface<'_> {
         self.names(|_| true)
     }
 
-    /// Those of them that have something to repay: all but the scans.
+    /// Those of them that may overtake a scan: all but the scans.
     pub fn no_scans(&self) -> Vec<&str> {
         self.names(|cell| !cell.is_scan())
     }

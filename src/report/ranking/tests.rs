@@ -26,7 +26,7 @@ fn ranks_are_the_runs_own_and_what_failed_has_none() {
     let rows = [
         ("peer-x", 104.0, Some(1)),
         ("a", 100.0, Some(1)),
-        ("peer-y", 90.0, None),
+        ("peer-y", 90.0, Some(1)),
         ("b", 101.0, Some(3)),
         ("c", 5.0, None),
     ];
@@ -38,6 +38,9 @@ fn ranks_are_the_runs_own_and_what_failed_has_none() {
     for peer in [0, 2] {
         cells[peer].origin = Some(Origin::Crate("theirs".to_owned()));
     }
+    cells[4].status = Status::Wrong;
+    cells[2].status = Status::Unsafe;
+    without_false_ranks(&mut cells);
     let of = |cells: &'static [ReportCell]| Comparison {
         cells: ranked(cells.iter().collect()),
         bounds: Vec::new(),
@@ -90,6 +93,17 @@ fn cells_are_matched_by_their_whole_name_each_once() {
     }
     // What was measured and found is no part of the name.
     assert_eq!(changed(|c| c.scene.digest.push('x')), (1, [0, 0]));
+}
+
+#[test]
+fn no_time_of_zero_or_below_has_a_rank() {
+    for (ns, wanted) in [(7.0, Some(1)), (0.0, None), (-5.0, None), (f64::NAN, None)] {
+        let mut cells = [cell("s", 10, "p", "a", 1.0)];
+        cells[0].rank = Some(1);
+        cells[0].metrics.get_mut("query_ns").unwrap().value = ns;
+        without_false_ranks(&mut cells);
+        assert_eq!(cells[0].rank, wanted, "{ns}");
+    }
 }
 
 /// Two paths with times of each structure, ranked by them.

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::graph::Opening;
+use crate::kernel::each;
 use crate::visibility::Rays;
 
 /// A part of the image: left, right, bottom, top, slopes per unit of depth.
@@ -63,9 +64,10 @@ impl View {
     ///
     /// `None` if it is surely not in the image, or beyond the far plane.
     pub fn rectangle(&self, opening: &Opening) -> Option<Window> {
-        let corners = opening.corners.map(|c| c - self.eye);
-        let corners = corners.map(|d| DVec3::from(self.axes.map(|axis| axis.dot(d))));
-        let sizes = corners.map(|c| c.abs().element_sum());
+        let corners = each(opening.corners, |c| {
+            DVec3::from(each(self.axes, |axis| axis.dot(c - self.eye)))
+        });
+        let sizes = each(corners, |c| c.abs().element_sum());
         let reach = sizes.into_iter().fold(0.0, f64::max);
         if corners.iter().all(|c| c.z - reach * SLACK > self.far) {
             return None;
