@@ -180,7 +180,7 @@ pub struct SceneDrawArgs {
     #[arg(long, value_name = "STRUCTURE")]
     pub structure: Option<String>,
     /// A camera path (spec or cameras CSV); one of its cameras is drawn with its query
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", visible_aliases = ["path", "cameras"])]
     pub camera: Option<String>,
     /// The camera of the path, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::whole(0..=u32::MAX))]

@@ -96,14 +96,17 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     let timed = cells.filter_map(|cell| Some((cell, views.times.get(&cell.structure)?)));
     for (cell, readings) in timed {
         let readings: Vec<_> = readings.iter().filter(|r| is_drawn(r.ns)).collect();
-        let point = |reading: &&Reading| Point::new([reading.frame, reading.ns]);
+        // At the level of the table's time, which has an estimator of its own.
+        let mean = readings.iter().map(|r| r.ns).sum::<f64>() / readings.len() as f64;
+        let scale = cell.time().map_or(1.0, |time| time.value / mean);
+        let point = |reading: &&Reading| Point::new([reading.frame, reading.ns * scale]);
         if readings.len() >= LEAST_READINGS[0] {
             queries = readings.iter().map(|r| r.queries).fold(queries, u32::max);
             let points = readings.iter().map(point).collect();
             series.push(Series::of(&cell.structure, cell.is_scan(), points));
         }
         if readings.len() >= LEAST_READINGS[1] {
-            let ns = sorted(readings.iter().map(|r| r.ns).collect());
+            let ns = sorted(readings.iter().map(|r| r.ns * scale).collect());
             let quantiles =
                 [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(&ns, share).unwrap_or(ns[0]));
             let ([low, first, median, third, high], told) = (quantiles, quantiles.map(text::time));

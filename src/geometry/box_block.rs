@@ -151,30 +151,30 @@ impl BoxBlock {
         isa: I,
         planes: impl Iterator<Item = (&'p Plane, BoxCorner, &'p SphereMargin)>,
     ) -> LaneMask {
-        // `Ball::in_cube`, with the same roundings.
-        let times = |x: f32, row: usize| isa.mul(isa.splat(x), isa.load(&self.rows[row]));
-        let centre = |k: usize| {
-            let middle = isa.add(times(0.5, k), times(0.5, k + 3));
-            let least = isa.max(middle, isa.load(&self.rows[k]));
-            isa.min(least, isa.load(&self.rows[k + 3]))
-        };
-        let half = |k: usize| isa.add(times(0.5, k + 3), times(-0.5, k));
-        let farthest = |k: usize| isa.max(times(-1.0, k), isa.load(&self.rows[k + 3]));
-        let [x, y, z] = [centre(0), centre(1), centre(2)];
-        let radius = isa.min(isa.min(half(0), half(1)), half(2));
-        let reach = isa.max(isa.max(farthest(0), farthest(1)), farthest(2));
+        // `Ball::in_cube`, with the same roundings. No closures: those that are called twice
+        // are compiled apart, without the instruction set.
+        let mut centre = [isa.splat(0.0); 3];
+        let mut radius = isa.splat(f32::INFINITY);
+        let mut reach = isa.splat(f32::NEG_INFINITY);
+        for (k, centre) in centre.iter_mut().enumerate() {
+            let (low, high) = (isa.load(&self.rows[k]), isa.load(&self.rows[k + 3]));
+            let (half_low, half_high) = (scaled(isa, 0.5, low), scaled(isa, 0.5, high));
+            let middle = isa.add(half_low, half_high);
+            *centre = isa.min(isa.max(middle, low), high);
+            radius = isa.min(radius, isa.add(half_high, scaled(isa, -0.5, low)));
+            reach = isa.max(reach, isa.max(scaled(isa, -1.0, low), high));
+        }
+        let [x, y, z] = centre;
         // Cubes cut off at the end of f32 have no sphere.
         let whole = !isa.at_most(isa.splat(f32::MAX), reach);
         let mut dropped = 0;
         for (plane, corner, margin) in planes {
-            let along = |n: f32, c: I::Floats| isa.mul(isa.splat(n), c);
             let n = plane.normal;
-            let sum = isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z));
-            let sum = isa.add(
-                isa.add(sum, isa.splat(margin.d)),
-                along(margin.length, radius),
-            );
-            let value = isa.add(sum, along(margin.slope, reach));
+            let sum = isa.add(scaled(isa, n.x, x), scaled(isa, n.y, y));
+            let sum = isa.add(sum, scaled(isa, n.z, z));
+            let sum = isa.add(sum, isa.splat(margin.d));
+            let sum = isa.add(sum, scaled(isa, margin.length, radius));
+            let value = isa.add(sum, scaled(isa, margin.slope, reach));
             let is_number = isa.at_most(isa.splat(f32::MIN), value);
             let far = values_at(isa, plane, self.corner_rows(corner));
             dropped |= isa.below_zero(far) | (isa.below_zero(value) & is_number & whole);
@@ -236,6 +236,11 @@ const LANE_BITS: [u32; LANES] = {
     bits
 };
 
+#[inline(always)]
+fn scaled<I: Isa>(isa: I, x: f32, floats: I::Floats) -> I::Floats {
+    isa.mul(isa.splat(x), floats)
+}
+
 /// [`Plane::value_at`] of sixteen corners, given as rows.
 #[inline(always)]
 fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::Floats {
@@ -245,8 +250,8 @@ fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::F
 /// The part of it that all planes of one normal have in common.
 #[inline(always)]
 pub(super) fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
-    let along = |n: f32, row: &[f32; LANES]| isa.mul(isa.splat(n), isa.load(row));
-    isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z))
+    let sum = isa.add(scaled(isa, n.x, isa.load(x)), scaled(isa, n.y, isa.load(y)));
+    isa.add(sum, scaled(isa, n.z, isa.load(z)))
 }
 
 #[inline(always)]

@@ -166,7 +166,15 @@ const FAR_OUTSIDE: f64 = 3.0;
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
-    let doubts: [Doubt; 6] = [bare, rolled, unstraight, mirrored, far_outside, blind];
+    let doubts: [Doubt; 7] = [
+        bare,
+        rolled,
+        unstraight,
+        shallow,
+        mirrored,
+        far_outside,
+        blind,
+    ];
     let found = doubts.iter().filter_map(|doubt| doubt(scene, cameras));
     found.map(|doubt| format!("{path}: {doubt}")).collect()
 }
@@ -286,6 +294,26 @@ fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
     // A mirrored image may have y downward.
     let along = if is_mirrored { along.abs() } else { along };
     Some(([across, along], frame.v()))
+}
+
+/// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
+fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
+    let is_shallow = |camera: &&Camera| {
+        let Some(matrix) = camera.lens.matrix().filter(|m| !m.is_from_zero()) else {
+            return false;
+        };
+        let [_, _, z, w] = matrix.rows();
+        let along = |row: &[f64; 4]| DVec3::from_slice(row).dot(camera.frame.forward());
+        camera.lens.far().is_none() && (along(z) / along(w)).abs() < 0.5
+    };
+    let count = cameras.iter().filter(is_shallow).count();
+    (count > 0).then(|| {
+        let what = share(count, cameras);
+        format!(
+            "{what} read without a far plane, as depth -1 is never reached; \
+             --matrix-convention column-d3d or row-d3d if depth is from 0 to 1"
+        )
+    })
 }
 
 /// Matrices that are no camera's, and those whose transposes are.

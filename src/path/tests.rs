@@ -338,6 +338,25 @@ fn a_matrix_of_a_view_alone_is_doubted() {
 }
 
 #[test]
+fn reversed_depth_from_0_to_1_is_doubted_where_it_is_read_from_minus_1() {
+    let scene = scene("uniform:n=50");
+    let (near, far) = (0.1, 60.0);
+    let told = |convention| {
+        let rows = [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, near / (far - near), near * far / (far - near)],
+            [0.0, 0.0, -1.0, 0.0],
+        ];
+        let camera = Camera::of_matrix(rows, convention).unwrap();
+        let told = warnings(&scene, "p", &[camera]).join(", ");
+        told.contains("depth -1 is never reached")
+    };
+    let conventions = [MatrixConvention::ColumnGl, MatrixConvention::ColumnD3d];
+    assert_eq!(conventions.map(told), [true, false]);
+}
+
+#[test]
 fn a_long_path_is_thinned_evenly() {
     let scene = scene::load("uniform:n=5", &Default::default()).unwrap();
     let mut all = path("orbit:frames=10", &scene);

@@ -12,7 +12,7 @@ use crate::geometry::{
 
 use super::predicate::Bits;
 use super::{Containment, NoRecorder, Predicate};
-use crate::kernel::{Isa, each};
+use crate::kernel::Isa;
 
 /// A frustum, a point or a box that sees items.
 ///
@@ -83,7 +83,12 @@ pub trait QueryVolume: Predicate {
         blocks: &[BoxBlock; 4],
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
-        each([0, 1, 2, 3], |i| self.kept_lanes(isa, &blocks[i], mask))
+        // No closure: it would be compiled apart, without the instruction set.
+        let mut kept = [0; 4];
+        for (i, block) in blocks.iter().enumerate() {
+            kept[i] = self.kept_lanes(isa, block, mask);
+        }
+        kept
     }
 
     /// Prefetches the rows of a block that [`QueryVolume::kept_lanes`] reads.

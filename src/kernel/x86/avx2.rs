@@ -33,14 +33,22 @@ type Words = [__m256i; 2];
 
 /// Elementwise operations on two vectors, written out.
 ///
-/// `array::from_fn` and `map` are functions of their own, which a build without link-time
-/// optimisation leaves outside the kernel, compiled without its instructions (seen: a scan
-/// 65 times slower).
+/// `array::from_fn` and `map`, and closures that are called twice, are functions of their
+/// own, which a build without link-time optimisation leaves outside the kernel, compiled
+/// without its instructions (seen: a scan 65 times slower).
 macro_rules! each {
-    ($op:expr) => {{
-        let of = $op;
-        [of(0_usize), of(1)]
-    }};
+    (|$i:ident| $op:expr) => {
+        [
+            {
+                let $i = 0_usize;
+                $op
+            },
+            {
+                let $i = 1_usize;
+                $op
+            },
+        ]
+    };
 }
 
 /// Methods of [`Isa`] that are one instruction per vector.

@@ -51,7 +51,7 @@ impl File<'_> {
         note_counted(self.name, [
             (items(&|i| nodes[i.node].skin.is_some()), "item", "with a skin, placed by its node and not by joints"),
             (items(&is_morphed), "item", "with morph weights, as stored and not morphed"),
-            (items(&|i| moved[i.node]), "item", "that an animation moves, where its node stands"),
+            (items(&|i| moved[i.node]), "item", "that an animation moves, placed where its node stands: it is not played"),
             (items(&|i| hidden[i.node]), "item", "hidden by KHR_node_visibility, read all the same"),
             (read(&|n| nodes[n].camera.is_some()) - cameras, "camera", "without a direction of view, left out"),
             (root.scenes.len().saturating_sub(1), "further scene", "not read"),
