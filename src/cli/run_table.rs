@@ -113,6 +113,9 @@ pub type Figure = (&'static str, &'static str, fn(f64) -> String);
 pub const OF_QUERIES: [Figure; 10] = [
     ("build", "build_ms", |ms| text::time(ms * 1e6)),
     ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
+    ("repaid after", "break_even_queries", |n| {
+        text::count(n as usize)
+    }),
     ("p95", "query_ns_p95", text::time),
     ("nodes tested", "nodes_tested", text::significant),
     ("items tested", "items_tested", text::significant),
@@ -120,9 +123,6 @@ pub const OF_QUERIES: [Figure; 10] = [
     ("/ copy", "times_memcpy", text::significant),
     ("locate", "locate_ns", text::time),
     ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
-    ("repaid after", "break_even_queries", |n| {
-        text::count(n as usize)
-    }),
 ];
 
 /// Figures of frames, before the first two of queries.

@@ -301,7 +301,9 @@ impl Wide {
             return ControlFlow::Continue(());
         };
         let mut open = [(0, 0); MOST_LEVELS];
-        let mut holding = |level: usize, block: usize| {
+        let (mut level, mut block) = (top, 0);
+        loop {
+            // In one place, to be compiled for the instruction set.
             let lanes = if level == 0 {
                 recorder.items_tested(self.occupied[block].count_ones());
                 self.occupied[block]
@@ -310,26 +312,22 @@ impl Wide {
                 recorder.nodes_tested(lanes.count_ones());
                 lanes
             };
-            self.blocks[self.levels[level].first + block].holding(p) & lanes
-        };
-        let mut level = top;
-        open[level] = (0, holding(level, 0));
-        loop {
-            let (block, left) = open[level];
+            let held = self.blocks[self.levels[level].first + block].holding(p) & lanes;
+            open[level] = (block, held);
             if level == 0 {
-                sink.accept_lanes(isa, &self.ids, block * LANES, left)?;
+                sink.accept_lanes(isa, &self.ids, block * LANES, held)?;
+                open[0].1 = 0;
             }
-            if level == 0 || left == 0 {
+            while open[level].1 == 0 {
                 if level == top {
                     return ControlFlow::Continue(());
                 }
                 level += 1;
-                continue;
             }
+            let (parent, left) = open[level];
             open[level].1 &= left - 1;
             level -= 1;
-            let child = block * LANES + left.trailing_zeros() as usize;
-            open[level] = (child, holding(level, child));
+            block = parent * LANES + left.trailing_zeros() as usize;
         }
     }
 
