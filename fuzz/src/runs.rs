@@ -64,8 +64,7 @@ fn written(stream: &Stream) -> Vec<u8> {
 
 /// Joins the run with nothing, and continues it.
 fn go_on(folder: &Path) {
-    if let Some(merged) = read(merge(&[folder.to_owned()], (&[], ""), true)) {
-        merged.missing_named();
+    if let Some(merged) = read(merge(&[folder.to_owned()], (&[], ""))) {
         read(merged.write(&folder.join("merged"), &|| false));
     }
     if let Some((stopped, stream)) = read(StoppedRun::open(folder)) {
