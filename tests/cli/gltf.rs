@@ -93,7 +93,7 @@ fn notes_tell_of_what_is_not_read_as_drawn() {
     let done = cullbench(folder.path(), "scene info s.gltf");
     let notes = [
         "1 item with morph weights, as stored and not morphed",
-        "1 item that an animation moves, placed where its node stands",
+        "1 item that an animation moves, placed where its node stands: it is not played",
         "1 item hidden by KHR_node_visibility, read all the same",
         "1 camera without a direction of view, left out",
         "1 further scene not read",

@@ -298,7 +298,7 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
         ),
         (
             "away.csv",
-            "away.csv: nothing of z.csv as loaded is visible in any of 1 view",
+            "away.csv: nothing of z.csv as loaded is visible in its view",
         ),
         (
             "sheared.csv --matrix-convention column-gl",
