@@ -95,8 +95,7 @@ fn written(file: &str, default: Option<&str>) -> Result<Suite, InputError> {
         let begin = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(begin).filter(|b| *b == b'\n').count();
         let said = error.message().replace('\n', ", ").replace('`', "'");
-        let first = error.message().lines().next().unwrap_or_default();
-        let found = match in_words(first) {
+        let found = match in_words(error.message().lines().next().unwrap_or_default()) {
             (found, Some(wanted)) if said.starts_with("invalid ") => {
                 format!("{found}; expected {wanted}")
             }
