@@ -68,17 +68,9 @@ pub fn compare_against<'a>(
         sides: [workers()?.of(binary), workers()?.of(&own)],
     };
     // Before it begins: afterwards the load is its own.
-    let load = Machine::capture();
+    let busy = Machine::capture().busy().filter(|_| is_timed);
     let (changes, head) = duel.run()?;
-    let (busy, cores) = (load.load, load.cores);
-    let busy = busy.filter(|busy| is_timed && *busy > 0.5 * cores as f64);
-    let note = |busy| {
-        format!(
-            "the machine was busy (load average {busy:.1} on {}): both sides suffered alike, and \
-             it may take more pairs",
-            text::counted(cores, "core")
-        )
-    };
+    let note = |busy| format!("{busy}: both sides suffered alike, and it may take more pairs");
     let left_out = match plan.structures == STRUCTURES {
         true => left_out(registry, &args.what, &plan.plan)?,
         false => None,

@@ -16,7 +16,7 @@ use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::index::Registry;
 use crate::input::{is_readable, tell_warnings};
-use crate::measure::{NO_ITEMS, ProcessTimes, Setting, Status};
+use crate::measure::{Machine, NO_ITEMS, ProcessTimes, Setting, Status};
 use crate::path;
 use crate::scene::{self, Scene, split_part};
 
@@ -150,7 +150,10 @@ impl Study {
         let line = format!("at work: {work}; the defaults take {by_default}");
         self.bar.suspend(tell_warnings);
         if !self.bar.is_hidden() {
-            self.bar.suspend(|| tell(&line));
+            let busy = Machine::capture().busy();
+            let busy = busy.map(|busy| format!("warning: {busy}: times and advice may differ"));
+            self.bar
+                .suspend(|| busy.iter().chain([&line]).for_each(|line| tell(line)));
         }
     }
 

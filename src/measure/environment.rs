@@ -9,6 +9,7 @@ use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 
 use crate::kernel::Kernel;
 use crate::scene::hex;
+use crate::shown::counted;
 
 /// The machine of a run; what the system does not tell is `None`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -102,6 +103,15 @@ impl Machine {
     pub fn by(mut self, kernel: Kernel) -> Machine {
         self.instruction_set = kernel.name().to_owned();
         self
+    }
+
+    /// Sentence on a machine that other programs kept busy, half a process a core or more.
+    pub fn busy(&self) -> Option<String> {
+        let load = self.load.filter(|load| *load > 0.5 * self.cores as f64)?;
+        let cores = counted(self.cores, "core");
+        Some(format!(
+            "the machine was busy before it began (load average {load:.1} on {cores})"
+        ))
     }
 
     /// Bytes that surely push everything else out of the caches: twice the

@@ -14,7 +14,6 @@ use super::surface::enter_growths;
 use super::{Noise, Report, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
-use crate::shown::counted;
 use crate::statistics::{geometric_mean, two_speeds};
 
 /// A line of stream.jsonl.
@@ -290,17 +289,10 @@ pub fn dated(clock: SystemTime) -> SystemTime {
 
 /// Causes of noisy times, with advice.
 fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String> {
-    /// Processes that already run on a core, from which on it is called busy.
-    const BUSY: f64 = 0.5;
     let mut warnings = Vec::new();
-    let machine = &report.machine;
-    let busy = |load: &f64| *load > BUSY * machine.cores as f64;
-    if let Some(load) = machine.load.filter(busy) {
-        warnings.push(format!(
-            "the machine was busy when the run began (load average {load:.1} on {}): close \
-             other programs, or wait, and run again",
-            counted(machine.cores, "core")
-        ));
+    if let Some(busy) = report.machine.busy() {
+        let advice = "close other programs, or wait, and run again";
+        warnings.push(format!("{busy}: {advice}"));
     }
     if two_speeds * 10 > tasks {
         warnings.push(format!(
