@@ -105,7 +105,7 @@ impl Machine {
         self
     }
 
-    /// Sentence on a machine that other programs kept busy, half a process a core or more.
+    /// Sentence on a machine that was busy: half a process a core or more.
     pub fn busy(&self) -> Option<String> {
         let load = self.load.filter(|load| *load > 0.5 * self.cores as f64)?;
         let cores = counted(self.cores, "core");

@@ -19,7 +19,6 @@ pub use super::rays::Along;
 pub use body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 pub use ray_box::{Crossing, Probe};
 pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex, Visit};
-pub use ray_tree::Candidates;
 pub use ray_triangle::{Meeting, TriangleProbe};
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use super::super::rays::Along;
 use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
-use super::ray_tree::{Candidates, RayTree};
-use super::slabs::around;
+use super::ray_tree::RayTree;
+use super::slabs::above;
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 use crate::scene::Surfaces;
@@ -93,7 +93,7 @@ impl<B: Body> BodyIndex<B> {
     /// Shows each body that a ray does not certainly miss to a visitor, in no order.
     ///
     /// For rays that the slab tests in f32 do not cover.
-    pub fn walk_in_f64(&self, ray: &Ray, mut visit: impl FnMut(&B)) {
+    fn walk_in_f64(&self, ray: &Ray, mut visit: impl FnMut(&B)) {
         (self.tree).search_in_f64(ray, |place| visit(self.body(place)));
     }
 
@@ -167,38 +167,16 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
                 visitor.visit(body);
             });
         };
-        let mut found = AtOnce {
-            of,
-            visitor,
-            limit: f64::INFINITY,
-            bound: slabs.far(),
-        };
-        of.tree.search(isa, &slabs, &mut found);
-    }
-}
-
-/// Candidates that a visitor decides when they come.
-struct AtOnce<'a, B, V> {
-    of: &'a BodyIndex<B>,
-    visitor: &'a mut V,
-    limit: f64,
-    /// The limit in f32, rounded up.
-    bound: f32,
-}
-
-impl<B: Body, V: Visit<B>> Candidates for AtOnce<'_, B, V> {
-    #[inline(always)]
-    fn bound(&self) -> f32 {
-        self.bound
-    }
-
-    #[inline(always)]
-    fn offer(&mut self, _: f32, place: u32, _: impl FnOnce() -> Option<f32>) {
-        let limit = self.visitor.visit(self.of.body(place));
-        if limit < self.limit {
-            self.limit = limit;
-            self.bound = self.bound.min(around(limit)[1]);
-        }
+        let mut limit = f64::INFINITY;
+        let mut bound = slabs.far();
+        of.tree.search(isa, &slabs, |place| {
+            let latest = visitor.visit(of.body(place));
+            if latest < limit {
+                limit = latest;
+                bound = bound.min(above(limit));
+            }
+            bound
+        });
     }
 }
 

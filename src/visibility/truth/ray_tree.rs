@@ -65,10 +65,10 @@ impl RayTree {
         }
     }
 
-    /// Offers every item that the ray can meet no deeper than the candidates'
-    /// bound, near ones first as far as the tree tells.
+    /// Offers every item that the ray can meet no deeper than the bound that the last
+    /// `offer` returned, near ones first as far as the tree tells.
     #[inline(always)]
-    pub fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
+    pub fn search<I: Isa>(&self, isa: I, slabs: &Slabs, mut offer: impl FnMut(u32) -> f32) {
         // Behind an opaque pointer, so that each node reads the ray's numbers again, which
         // AVX-512 does within the instruction that needs them.
         // Spread over whole vectors ahead of the loop, they are read back from the stack.
@@ -80,20 +80,19 @@ impl RayTree {
         if self.nodes.is_empty() {
             return;
         }
+        let mut bound = slabs.far();
         let mut at = self.root;
         loop {
             let node = &self.nodes[at.node()];
-            let tested = slabs.test(isa, node.boxes.rows(), found.bound());
+            let tested = slabs.test(isa, node.boxes.rows(), bound);
             let items = at.items();
             let left = tested.lanes;
             if left != 0 {
                 let less_entry = isa.to_array(tested.less_entry);
                 for lane in Bits((left & items).into()) {
                     let lane = lane as usize % LANES;
-                    let low = -less_entry[lane];
-                    if low <= found.bound() {
-                        let latest = || slabs.latest(node.boxes.rows(), lane, low);
-                        found.offer(low, node.children[lane], latest);
+                    if -less_entry[lane] <= bound {
+                        bound = offer(node.children[lane]);
                     }
                 }
                 let mut nodes = Bits((left & !items).into()).map(|lane| {
@@ -109,7 +108,7 @@ impl RayTree {
                         }
                         open.push_sorted(first, other);
                     }
-                    if next.0 <= found.bound() {
+                    if next.0 <= bound {
                         at = Child(next.1);
                         continue;
                     }
@@ -118,7 +117,7 @@ impl RayTree {
             loop {
                 match open.pop() {
                     None => return,
-                    Some((low, next)) if low <= found.bound() => {
+                    Some((low, next)) if low <= bound => {
                         at = Child(next);
                         break;
                     }
@@ -154,14 +153,6 @@ fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     let (half, from) = ((max - min) * 0.5 + slack, start - (min + max) * 0.5);
     let turned = from.cross(d).abs();
     turned.cmpgt(cross_sizes(half, d.abs())).any()
-}
-
-/// Candidates that a search collects.
-pub trait Candidates {
-    /// Nothing deeper than this is wanted.
-    fn bound(&self) -> f32;
-    /// A box that can be entered from `low` on, and up to what `Slabs::latest` says.
-    fn offer(&mut self, low: f32, place: u32, latest: impl FnOnce() -> Option<f32>);
 }
 
 /// Nodes kept without the heap.
@@ -254,7 +245,7 @@ const EMPTY: Node = Node {
 impl RayTree {
     /// Builds the tree over boxes relative to a zero. O(n log n).
     ///
-    /// Returns their ids in tree order; [`Candidates`] get positions in these.
+    /// Returns their ids in tree order; searches offer positions in these.
     pub fn of(boxes: &[Aabb], zero: DVec3) -> (RayTree, Vec<ItemId>) {
         let mut items = Record::numbered(boxes);
         let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);

@@ -28,10 +28,7 @@
 //! is 1/4 or more and all lengths are at most 2^36), by which it moves less than
 //! 2^-40 along that axis. The origin lies between the sides of a box that such a
 //! ray meets (but for that), so the lower bound of entry comes out below -2^43
-//! and the upper one of exit above 2^43: neither rejects it. Where the upper bound
-//! of entry is not above the lower one of exit, which then is -2^40 or more, the
-//! origin is 2^-21 or more within both sides: that axis is crossed 2^59 before
-//! and behind, whichever way. Else the upper bound of entry says nothing.
+//! and the upper one of exit above 2^43: neither rejects it.
 
 use glam::{DVec3, Vec3};
 
@@ -47,15 +44,12 @@ const INVERSE_OF_NONE: f32 = (1u128 << 64) as f32;
 /// The slack of such an axis, at least.
 const SLACK_OF_NONE: f64 = (1u64 << 44) as f64;
 
-/// Below the largest f32, above all depths.
-const MOST_DEPTH: f64 = 1e38;
-
-/// Two f32 below and above a depth: one part in 2^24 is lost when they are
-/// rounded, and less than 1e-37 where they underflow. (Infinity has no lower one.)
+/// The f32 above a depth.
+///
+/// One part in 2^24 is lost when it is rounded, and less than 1e-37 where it underflows.
 #[inline(always)]
-pub fn around(depth: f64) -> [f32; 2] {
-    let more = depth.abs() * f64::from(f32::EPSILON) + 1e-37;
-    [(depth - more) as f32, (depth + more) as f32]
+pub fn above(depth: f64) -> f32 {
+    (depth + (depth.abs() * f64::from(f32::EPSILON) + 1e-37)) as f32
 }
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z.
@@ -72,8 +66,8 @@ pub struct Slabs {
     low: [f32; 3],
     high: [f32; 3],
     /// Near and far, rounded down and up.
-    near: [f32; 2],
-    far: [f32; 2],
+    near: f32,
+    far: f32,
 }
 
 /// Result of the test of sixteen boxes.
@@ -105,8 +99,8 @@ impl Slabs {
             inverse: [0.0; 3],
             low: [0.0; 3],
             high: [0.0; 3],
-            near: around(ray.near),
-            far: [around(ray.far.min(MOST_DEPTH))[0], around(ray.far)[1]],
+            near: -above(-ray.near),
+            far: above(ray.far),
         };
         for axis in 0..3 {
             let along = ray.direction[axis];
@@ -133,7 +127,7 @@ impl Slabs {
     /// The far plane, rounded up: nothing deeper is met.
     #[inline(always)]
     pub fn far(&self) -> f32 {
-        self.far[1]
+        self.far
     }
 
     /// The boxes that the ray can meet no deeper than `most`.
@@ -151,33 +145,11 @@ impl Slabs {
         };
         let less_entry = isa.min(entry(0), isa.min(entry(1), entry(2)));
         let exit = isa.min(isa.min(exit(0), exit(1)), isa.min(exit(2), isa.splat(most)));
-        let less_first = isa.min(less_entry, isa.splat(-self.near[0]));
+        let less_first = isa.min(less_entry, isa.splat(-self.near));
         Tested {
             // A sum has the sign of the true one.
             lanes: !isa.below_zero(isa.add(less_first, exit)),
             less_entry,
         }
-    }
-
-    /// The box of one lane that [`Slabs::test`] let pass, `low` being what it found, is
-    /// entered at this depth or earlier if it is met for certain, else infinite; `None` if
-    /// it is entered before the near plane for certain.
-    #[inline(always)]
-    pub fn latest(&self, rows: &Rows, lane: usize, low: f32) -> Option<f32> {
-        let at = |row: usize, axis: usize, c: &[f32; 3]| {
-            rows[row % 6][lane % LANES] * self.inverse[axis] + c[axis]
-        };
-        let entry = |axis: usize| at(self.first[axis], axis, &self.high);
-        let exit = |axis: usize| at(self.last[axis], axis, &self.low);
-        let high = entry(0).max(entry(1)).max(entry(2));
-        let leaves = exit(0).min(exit(1)).min(exit(2));
-        let mut high = if high <= leaves { high } else { f32::INFINITY };
-        if high < self.near[0] {
-            return None;
-        }
-        if low < self.near[1] || high > self.far[0] {
-            high = f32::INFINITY;
-        }
-        Some(high)
     }
 }
