@@ -17,7 +17,7 @@ use super::compare_table::{CompareTable, Side};
 use super::processes::{Job, Message, Workers};
 use super::run_resume::TypedOptions;
 use super::shared_args::WhatArgs;
-use super::study::progress;
+use super::study::{progress, tell_progress};
 use super::{interrupt, run_plan, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
@@ -198,6 +198,7 @@ impl Duel<'_> {
         let started = Instant::now();
         let (first, most) = pairs(self.args);
         let bar = progress(most as u64, " pairs");
+        let mut told = started;
         bar.set_message("counting and checking answers");
         let mut seen = self.count()?;
         let mut rng = Pcg64::seed_from_u64(self.plan.seed);
@@ -225,6 +226,7 @@ impl Duel<'_> {
                 }
             }
             bar.set_position(pairs as u64);
+            tell_progress(&bar, "pairs", &mut told);
             bar.set_message("pairs of processes");
             for scene in 0..self.plan.scenes.len() {
                 let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;

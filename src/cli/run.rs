@@ -16,7 +16,7 @@ use super::processes::{Ended, Job, Message, Workers};
 use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, create, go_on, resume};
-use super::study::progress;
+use super::study::{progress, tell_progress};
 use super::{
     Ending, compare, expect_folder, interrupt, program, run_why, tell, text, unread_is_fine,
 };
@@ -90,6 +90,8 @@ struct Run<'a> {
     workers: Workers,
     bar: ProgressBar,
     started: Instant,
+    /// When a line told of the progress.
+    told: Instant,
     /// True where a part of the run was there before.
     resumes: bool,
 }
@@ -105,6 +107,7 @@ impl<'a> Run<'a> {
             // the next.
             workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
             started: Instant::now(),
+            told: Instant::now(),
             resumes: !stream.parts.is_empty(),
             args,
             plan,
@@ -231,6 +234,7 @@ impl<'a> Run<'a> {
             if let Message::Part(part, samples) = said {
                 self.stream.parts.push(self.folder.keep(*part, &samples)?);
                 self.bar.inc(1);
+                tell_progress(&self.bar, "parts", &mut self.told);
             }
             Ok(())
         };

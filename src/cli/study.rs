@@ -43,6 +43,19 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     bar
 }
 
+/// Tells where no bar is drawn how much of the `parts` is done: a line a minute.
+pub fn tell_progress(bar: &ProgressBar, parts: &str, told: &mut Instant) {
+    if bar.is_hidden() && told.elapsed() >= Duration::from_secs(60) {
+        *told = Instant::now();
+        let (done, all) = (bar.position(), bar.length().unwrap_or(0));
+        let left = all.saturating_sub(done) as f64 / done.max(1) as f64;
+        let left = HumanDuration(bar.elapsed().mul_f64(left));
+        tell(&format!(
+            "at work: {done} of {all} {parts} done, {left:#} left"
+        ));
+    }
+}
+
 /// Loads what the arguments name, in a worker for its `timing`.
 ///
 /// In the command itself `held` gives structures to have room for, by the number of those

@@ -62,6 +62,11 @@ impl RegionIndex for LinearScalar {
 /// Number of blocks that one call of the sink tests: 64 KiB of ids.
 const BLOCKS_PER_CALL: usize = 1024;
 
+/// Least number of blocks of a scan that threads share: 131,072 items.
+///
+/// Waking the threads takes as long as scanning half of it.
+const LEAST_SHARED: usize = 8 * BLOCKS_PER_CALL;
+
 /// The scan over blocks: all planes against sixteen boxes at once, no early exit.
 /// O(n) per query, with a constant several times smaller.
 pub struct Linear {
@@ -233,9 +238,9 @@ impl RegionIndex for Linear {
             return scan_blocks(blocks, &self.ids, (volume, volume.mask()), cx);
         }
         let blocks = self.boxes.blocks().len();
-        // Counted queries are not shared: one recorder, one thread. Nor is a single part.
+        // Counted queries are not shared: one recorder, one thread.
         if size_of::<C::Recorder>() == 0
-            && blocks > BLOCKS_PER_CALL
+            && blocks >= LEAST_SHARED
             && let Some(workers) = &self.workers
         {
             let (isa, parts) = (cx.isa(), blocks.div_ceil(BLOCKS_PER_CALL));

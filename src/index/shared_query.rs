@@ -67,7 +67,7 @@ mod tests {
         let planes = [Plane::new(normal, -9.0), Plane::new(-normal, 14.0)];
         let volume = ConvexVolume::from_planes(&planes).unwrap();
         let spheres = Spheres::new(&volume);
-        for count in [0, 15, 16_384, 16_385, 50_001] {
+        for count in [0, 15, 16_385, 131_072, 150_001] {
             let at = |i: u32| Vec3::new((i % 37) as f32, (i / 37 % 41) as f32, (i / 1517) as f32);
             let items = (0..count).map(|i| Aabb::around(at(i), Vec3::splat(0.3)));
             let items: Vec<Aabb> = items.collect();
