@@ -123,7 +123,10 @@ impl Auto {
         // Tree order is spread over space: half, a quarter, .. of the items between.
         let at = i * ids.len() / VIEWS;
         let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
-        let forward = (end - eye).try_normalize()?;
+        // By a power of two, so that no square of a length overflows.
+        let span = end - eye;
+        let scale = f32::from_bits(span.abs().max_element().to_bits() & f32::INFINITY.to_bits());
+        let forward = (span / scale).try_normalize()?;
         let (right, up) = forward.any_orthonormal_pair();
         let side = |across| (forward * 0.5 + across * 0.75_f32.sqrt(), eye);
         let planes = [
@@ -475,7 +478,8 @@ impl RegionIndex for Auto {
 
     fn chose(&self) -> Option<String> {
         let others = |names: &[&str], costs: &[f64], taken: usize| {
-            let others = (0..names.len()).filter(|&i| i != taken && costs[i].is_finite());
+            let others =
+                (0..names.len()).filter(|&i| i != taken && (costs[i] / costs[taken]).is_normal());
             let ratio =
                 |i: usize| format!("{} (modelled {:.3} x)", names[i], costs[i] / costs[taken]);
             let others = others.map(ratio).collect::<Vec<_>>().join(", ");

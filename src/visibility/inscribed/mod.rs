@@ -67,11 +67,14 @@ pub fn inscribed_boxes(
         return None;
     }
     let most = most.min(MOST_BOXES);
-    let volume = solid.volume(0);
+    let (parts, cells) = (parts(&solid), cells.clamp(4, 64));
+    let volume_of = |part: &Vec<[Vec3; 3]>| volume_within(part.iter().copied());
+    // Pieces that are wound inward hold no box.
+    let inward: f64 = parts.iter().map(|part| volume_of(part).min(0.0)).sum();
+    let volume = solid.volume(0) - inward;
     let least = volume * LEAST_GAIN;
     // A box adds no more than its piece has.
-    let large = |part: &&Vec<[Vec3; 3]>| volume_within(part.iter().copied()) >= least;
-    let (parts, cells) = (parts(&solid), cells.clamp(4, 64));
+    let large = |part: &&Vec<[Vec3; 3]>| volume_of(part) >= least;
     let large = parts.iter().filter(large);
     let found = large.flat_map(|part| boxes_in(part, cells, most, least));
     let mut found: Vec<(f64, Aabb)> = found.collect();
@@ -410,6 +413,22 @@ mod tests {
         assert!(share > 0.2 && share < 1.0, "{share}");
         let (_, ground) = inner_boxes(&mesh("terrain", 2000), CELLS, BOXES, 1);
         assert_eq!((ground.boxed_count, ground.volume_share), (0, None));
+    }
+
+    #[test]
+    fn a_piece_wound_inward_takes_nothing_from_the_share() {
+        let mut house = Surfaces::about(DVec3::ZERO);
+        let at = |x: f32| Aabb::new(Vec3::X * x, Vec3::X * x + Vec3::splat(4.0));
+        house.push_box(SurfaceKind::Opaque, false, &at(0.0));
+        let alone = inscribed_boxes(&house, 0, 8, 2);
+        let (first, end) = (house.triangles.len(), house.of_item[0].end);
+        house.push_box(SurfaceKind::Opaque, false, &at(9.0));
+        house.triangles[first..]
+            .iter_mut()
+            .for_each(|t| t.swap(0, 1));
+        house.of_item.truncate(1);
+        house.of_item[0].end = 2 * end;
+        assert_eq!(inscribed_boxes(&house, 0, 8, 2), alone);
     }
 
     #[test]

@@ -360,3 +360,19 @@ fn a_scan_in_reserve_answers_from_the_second_update_on() {
         }
     }
 }
+
+/// Views do not depend on scale, even where the square of a length overflows.
+#[test]
+fn the_size_of_the_world_changes_no_choice() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    let items = cubes(&mut rng, 3000);
+    let grown = |by: f32| -> Vec<Aabb> {
+        let b = items.iter().map(|b| Aabb::new(b.min * by, b.max * by));
+        b.collect()
+    };
+    let told = built(&items, "").chose().unwrap();
+    for exponent in [-60, 60, 70] {
+        let same = built(&grown(2_f32.powi(exponent)), "").chose().unwrap();
+        assert_eq!(same, told, "2^{exponent}");
+    }
+}
