@@ -77,13 +77,14 @@ fn likeness(word: &str, known: &str) -> f64 {
 /// `1_000`.
 pub fn parse_number(text: &str) -> Option<f64> {
     let plain = text.trim().replace('_', "");
-    let (digits, factor) = match plain.char_indices().next_back()? {
-        (at, 'k') => (&plain[..at], 1e3),
-        (at, 'M') => (&plain[..at], 1e6),
-        (at, '%') => (&plain[..at], 1e-2),
-        _ => (plain.as_str(), 1.0),
+    let (digits, exponent) = match plain.char_indices().next_back()? {
+        (at, 'k') => (&plain[..at], "e3"),
+        (at, 'M') => (&plain[..at], "e6"),
+        (at, '%') => (&plain[..at], "e-2"),
+        _ => (plain.as_str(), ""),
     };
-    let value = digits.parse::<f64>().ok()? * factor;
+    // In one rounding: 2.01 times a thousand is not 2,010.
+    let value = format!("{digits}{exponent}").parse::<f64>().ok()?;
     value.is_finite().then_some(value)
 }
 

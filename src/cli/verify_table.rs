@@ -78,16 +78,21 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
     }
     let own = all.iter().map(|(_, own)| own);
     let differ = own.filter(|own| own.iter().any(|check| check.difference.is_some()));
+    let is_silent = |check: &&Check| check.difference.is_none() && !check.is_answered();
+    let silent = all.iter().filter(|(_, own)| own.iter().any(is_silent));
     let (of, checks) = (text::counted(all.len(), "structure"), outcome.checks.len());
     let reference = "the reference scan";
     let checked = format!(
         "{}: {} in {:.1} s ({:.1} million/s), {}",
-        match (differ.count(), &all[..]) {
-            (0, []) => "Nothing was checked".to_owned(),
-            (0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
-            (0, _) => format!("All {of} return the sets of {reference}"),
-            (1, _) => format!("1 of {of} differs from {reference} or misses what the cameras see"),
-            (wrong, _) =>
+        match (differ.count(), silent.count(), &all[..]) {
+            (0, 0, []) => "Nothing was checked".to_owned(),
+            (0, 0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
+            (0, 0, _) => format!("All {of} return the sets of {reference}"),
+            (0, silent, _) => format!(
+                "{silent} of {of} did not answer (see status); else the sets of {reference}"
+            ),
+            (1, ..) => format!("1 of {of} differs from {reference} or misses what the cameras see"),
+            (wrong, ..) =>
                 format!("{wrong} of {of} differ from {reference} or miss what the cameras see"),
         },
         text::counted(outcome.verdicts as usize, "verdict"),

@@ -143,11 +143,14 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
             false => timed(&asked, schedule, &plan.protocol, &turn),
         };
         let alone = keys.iter().zip(&schedule.tasks);
-        let alone = alone.filter(|((_, kind), _)| *kind != TaskKind::Views);
+        // Lower bounds take a part of a query's time, and so have larger batches.
+        let is_alone =
+            |(label, kind): &TaskKey| *kind != TaskKind::Views && !bounds.contains(label);
+        let alone = alone.filter(|(key, _)| is_alone(key));
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
         for (key, result) in keys.iter().zip(timed) {
             let groups = schedule.cameras.len().div_ceil(largest);
-            let has_tail = key.1 == TaskKind::Query && groups >= LEAST_TAIL;
+            let has_tail = key.1 == TaskKind::Query && is_alone(key) && groups >= LEAST_TAIL;
             let largest = has_tail.then_some(largest);
             tasks.push(task_part(key, &result, schedule, largest));
             let mut own = entries.iter_mut().filter(|e| e.part.label == key.0);

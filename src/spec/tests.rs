@@ -41,6 +41,8 @@ pub(crate) fn known(error: &str) -> BTreeSet<&str> {
 #[test]
 fn numbers_take_suffixes() {
     let cases = [
+        ("2.01k", 2010.0),
+        ("1.001M", 1_001_000.0),
         ("100k", 1e5),
         ("10M", 1e7),
         ("2%", 0.02),

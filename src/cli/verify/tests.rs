@@ -76,3 +76,32 @@ fn a_panic_in_a_random_case_is_its_status_and_says_how_to_see_it_again() {
         "{told}"
     );
 }
+
+#[test]
+fn a_structure_that_refused_to_build_is_not_called_right() {
+    let scene = crate::scene::load("uniform:n=50", &Default::default()).expect("uniform");
+    let cameras = path::load("orbit:frames=2", &scene, &Default::default()).expect("orbit");
+    let linear = StructureSpec::parse("linear").expect("linear");
+    let refused = StructureSpec {
+        label: "refuses".to_owned(),
+        row: Row {
+            info: LinearScalar::INFO.named("refuses"),
+            build: |_, _, _| {
+                Err(crate::index::BuildError::Refused {
+                    structure: "refuses",
+                    reason: "too many alike".to_owned(),
+                })
+            },
+            params: |_| Ok(Value::Null),
+        },
+        ..linear.clone()
+    };
+    let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
+        let build = |spec: &StructureSpec| Subject::build(spec.clone(), false, &scene, test);
+        [&linear, &refused].map(build).into_iter().collect()
+    });
+    let rows = check_path(&scene, &cameras, &Culling::default(), &subjects, "again").expect("rows");
+    assert!(rows[0].is_answered() && rows[0].verdicts > 0);
+    assert!(!rows[1].is_answered() && rows[1].verdicts == 0);
+    assert!(rows[1].difference.is_none() && rows[1].status == "refused");
+}
