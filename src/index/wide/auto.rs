@@ -1,9 +1,8 @@
 //! The structure `auto`: a tree or a scan, and how it is updated.
 //!
-//! The build counts the work of a few frusta that look from item to item. Updates are
-//! weighed by what has moved, by the queries between them and by the work that the refitted
-//! tree has come to. All are counts, so every run chooses the same, and no answer depends
-//! on the choice.
+//! The build counts the work of a few frusta that look from item to item. Updates are weighed by
+//! what has moved, by the queries between them and by the work that the refitted tree has come to.
+//! All are counts, so every run chooses the same, and no answer depends on the choice.
 
 mod params;
 
@@ -115,18 +114,16 @@ impl Auto {
         let ids = &self.trees.still.ids[..];
         let centre = |at: usize| {
             let from = ids.iter().cycle().skip(at % ids.len().max(1));
-            let mut present = from
-                .take(ids.len())
-                .filter_map(|&id| items.get(id as usize));
+            let from = from.take(ids.len());
+            let mut present = from.filter_map(|&id| items.get(id as usize));
             Some(present.find(|b| !b.is_empty())?.centre())
         };
         // Tree order is spread over space: half, a quarter, .. of the items between.
         let at = i * ids.len() / VIEWS;
         let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
         // By a power of two, so that no square of a length overflows.
-        let span = end - eye;
-        let scale = f32::from_bits(span.abs().max_element().to_bits() & f32::INFINITY.to_bits());
-        let forward = (span / scale).try_normalize()?;
+        let scale = f32::from_bits((end - eye).abs().max_element().to_bits() & 0x7F80_0000);
+        let forward = ((end - eye) / scale).try_normalize()?;
         let (right, up) = forward.any_orthonormal_pair();
         let side = |across| (forward * 0.5 + across * 0.75_f32.sqrt(), eye);
         let planes = [
