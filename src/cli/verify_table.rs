@@ -88,8 +88,11 @@ pub(super) fn show(outcome: &Outcome) -> io::Result<()> {
             (0, 0, []) => "Nothing was checked".to_owned(),
             (0, 0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
             (0, 0, _) => format!("All {of} return the sets of {reference}"),
+            (0, silent, _) if silent == all.len() =>
+                "No structure answered (see status)".to_owned(),
             (0, silent, _) => format!(
-                "{silent} of {of} did not answer (see status); else the sets of {reference}"
+                "{silent} of {of} did not answer (see status), the others return the sets of \
+                 {reference}"
             ),
             (1, ..) => format!("1 of {of} differs from {reference} or misses what the cameras see"),
             (wrong, ..) =>

@@ -123,11 +123,11 @@ impl BoxBlock {
             let n = plane.normal;
             let [x, y, z] = self.corner_rows(corner);
             // As wide as the values: narrower ones would be packed for every plane.
-            let mut below = [0; LANES];
+            let mut below = [0_u64; LANES];
             for lane in 0..LANES {
                 let [x, y, z] = each([x, y, z], |row| f64::from(row[lane]));
                 let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
-                below[lane] = if value < 0.0 { WIDE_BITS[lane] } else { 0 };
+                below[lane] = if value < 0.0 { 1 << lane } else { 0 };
             }
             excluded |= below.iter().fold(0, |all, bit| all | bit);
         }
@@ -218,17 +218,6 @@ fn halved(row: &[f32; LANES], either: impl Fn(Vec4, Vec4) -> Vec4) -> Vec4 {
 /// The bit of each lane, as wide as a float: a comparison then selects among
 /// them without leaving the vector.
 const LANE_BITS: [u32; LANES] = {
-    let mut bits = [0; LANES];
-    let mut lane = 0;
-    while lane < LANES {
-        bits[lane] = 1 << lane;
-        lane += 1;
-    }
-    bits
-};
-
-/// The same, as wide as an f64.
-const WIDE_BITS: [u64; LANES] = {
     let mut bits = [0; LANES];
     let mut lane = 0;
     while lane < LANES {

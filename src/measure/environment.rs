@@ -110,7 +110,7 @@ impl Machine {
         let load = self.load.filter(|load| *load > 0.5 * self.cores as f64)?;
         let cores = counted(self.cores, "core");
         Some(format!(
-            "the machine was busy before it began (load average {load:.1} on {cores})"
+            "the machine was already busy (load average {load:.1} on {cores})"
         ))
     }
 

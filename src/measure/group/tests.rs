@@ -140,3 +140,30 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     let batches: Vec<u32> = planned.schedule.tasks.iter().map(|t| t.batch).collect();
     assert_eq!(batches, [3], "its own, not the one in its place");
 }
+
+/// Lower bounds take a part of a query's time, and so have larger batches.
+#[test]
+fn lower_bounds_take_no_tail_from_a_structure() {
+    let scene = scene();
+    let way = path::load("orbit:frames=40", &scene, &Default::default()).expect("a path");
+    let workload = Workload::new(&scene, &way, &Culling::default()).expect("a workload");
+    let (subjects, info) = (subjects("linear", &scene), SceneInfo::of(&scene));
+    let plan = |known, plan_only: bool| GroupPlan {
+        bounds: crate::measure::BOUNDS,
+        locate: false,
+        process: u32::from(!plan_only),
+        known,
+        plan_only,
+        ..GroupPlan::new(&workload, &info, protocol())
+    };
+    let first = queries(&workload, &subjects, plan(None, true)).0;
+    let mut known = first.known.expect("a plan");
+    let planned = known.query.as_mut().expect("queries");
+    planned.schedule.cameras = (0..40).collect();
+    for (key, task) in planned.keys.iter().zip(&mut planned.schedule.tasks) {
+        task.batch = if key.0 == "linear" { 1 } else { 40 };
+    }
+    let part = queries(&workload, &subjects, plan(Some(&known), false)).0;
+    let tails = part.tasks.iter().map(|task| task.tail_ns.len());
+    assert_eq!(tails.collect::<Vec<_>>(), [40, 0, 0]);
+}
