@@ -6,10 +6,9 @@
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
-use super::case::part_of;
+use super::case::{AdviseInput, part_of, planned};
 use super::choice::{fastest, time_over};
-use super::omission::is_longer;
-use super::options::{AdviseInput, planned};
+use super::trials::is_longer;
 use crate::culling::{Culling, CullingTest};
 use crate::measure::{
     Group, GroupPlan, Known, Part, ProcessTimes, ReportCell, SceneInfo, Subject, Workload, measure,

@@ -5,12 +5,11 @@
 
 use serde::Serialize;
 
-use super::omission::{is_longer, of_costs};
-use super::options::{SCAN, TREE};
-use super::trials::{Answered, Trials};
+use super::case::{AdviseInput, SCAN, TREE};
+use super::trials::{Answered, Trials, is_longer, of_costs};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
-use crate::index::BuildError;
+use crate::index::{BuildError, UpdatePolicy};
 use crate::measure::{OverProcesses, ReportCell};
 use crate::statistics::{Estimate, flat, rate_of, ratio};
 
@@ -177,15 +176,14 @@ impl TestChoice {
             let by_camera = answered.by_camera(task).unwrap_or_default();
             let missed = rate_of(by_camera, |e| [e.false_negatives, e.visible]);
             let extra = answered.false_positives_per_query(task);
+            let both = query.zip(extra);
             TestRow {
                 test: test.name(),
                 query_ns: query,
                 excess: rate_of(by_camera, |e| [e.false_positives, e.visible]),
                 false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
                 false_positives_per_query: extra,
-                total_ns: query
-                    .zip(extra)
-                    .map(|(query, extra)| query.value + extra * draw_ns),
+                total_ns: both.map(|(query, extra)| query.value + extra * draw_ns),
                 task,
             }
         });
@@ -224,11 +222,84 @@ fn near_the_least(rows: &[TestRow], times: &OverProcesses) -> Vec<&'static str> 
     near
 }
 
+/// Rebuilds are ruled out where the builds alone take this many times a frame.
+const RULED_OUT: f64 = 1.5;
+
+/// The policy to update the structure by.
+#[derive(Clone, Default, Debug, Serialize)]
+pub struct MotionChoice {
+    /// The fastest policy of the structure that is taken; null without a structure.
+    pub policy: Option<String>,
+    /// Others that the processes do not tell from it.
+    pub policy_ties: Vec<String>,
+    /// Measured policies of the structure, fastest first.
+    pub policies: Vec<ReportCell>,
+    /// Policies that are not measured, each with its builds / a frame with refits.
+    ///
+    /// Both are from the same processes.
+    pub ruled_out: Vec<(String, f64)>,
+    /// `false` if the structure is built again in every frame.
+    #[serde(skip)]
+    refits: bool,
+}
+
+impl MotionChoice {
+    /// The choice before it is made, and the label of the rebuilds to be measured.
+    ///
+    /// Policies of `--update` are rows of the run instead.
+    pub(super) fn begun(
+        input: &AdviseInput,
+        structure: &StructureChoice,
+    ) -> (MotionChoice, Option<String>) {
+        let mut all = input.setting.structures.iter();
+        let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
+        let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
+        let mut begun = MotionChoice {
+            refits: spec.is_none_or(|spec| spec.info().refits),
+            ..MotionChoice::default()
+        };
+        let spec = spec.filter(|_| begun.refits && !are_rows);
+        let rebuilt = spec.zip(structure.rows.first()).and_then(|(spec, row)| {
+            let builds = row.value("build_ms").unwrap_or(0.0) * 1e6;
+            if builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
+                let frames = builds / ns(row).unwrap_or(f64::INFINITY);
+                begun.ruled_out.push(("rebuild".to_owned(), frames));
+                return None;
+            }
+            Some(format!("{}@rebuild", spec.label))
+        });
+        (begun, rebuilt)
+    }
+
+    /// Chooses among the cells of the structure that is taken, under several policies.
+    pub(super) fn chosen(self, structure: &StructureChoice, cells: &[ReportCell]) -> MotionChoice {
+        let alone = |label: &str| label.split('@').next().map(str::to_owned);
+        let taken = structure.name.as_deref().and_then(alone);
+        let own = cells.iter().filter(|cell| alone(&cell.structure) == taken);
+        let own = StructureChoice::of(&own.cloned().collect::<Vec<_>>());
+        let policy = |label: &String| match policy_of(label) {
+            "refit" if !self.refits => "rebuild".to_owned(),
+            policy => policy.to_owned(),
+        };
+        MotionChoice {
+            policy: own.name.as_ref().map(policy),
+            policy_ties: own.ties.iter().map(policy).collect(),
+            policies: own.rows,
+            ..self
+        }
+    }
+}
+
+/// The policy in a label, `wide@every=10`.
+pub fn policy_of(label: &str) -> &str {
+    label.split_once('@').map_or("refit", |(_, policy)| policy)
+}
+
 #[cfg(test)]
 mod tests {
     use serde_json::json;
 
-    use super::super::options::planned;
+    use super::super::case::planned;
     use super::*;
     use crate::index::{Registry, UpdatePolicy};
     use crate::measure::ProcessTimes;

@@ -5,9 +5,7 @@
 mod case;
 mod change;
 mod choice;
-mod motion;
-mod omission;
-mod options;
+mod planes;
 mod rule;
 mod rules;
 mod trials;
@@ -15,12 +13,11 @@ mod trials;
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
+pub use case::AdviseInput;
 pub use change::{Axis, Beside, Change};
-pub use choice::{StructureChoice, TestChoice, TestRow, ns};
-pub use motion::{MotionChoice, policy_of};
-pub use omission::{Check, Side};
-pub use options::AdviseInput;
+pub use choice::{MotionChoice, StructureChoice, TestChoice, TestRow, ns, policy_of};
 pub use rule::Omission;
+pub use trials::{Check, Side};
 
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
@@ -32,8 +29,7 @@ use crate::statistics::Estimate;
 
 use case::Case;
 use rule::{Draft, Facts, Finding, Rule};
-use rules::RULES;
-use rules::stages;
+use rules::{RULES, input as stages};
 use trials::{Answered, BASE, Trials};
 
 /// Structure, test and features to leave out, with the evidence.
@@ -123,7 +119,7 @@ pub fn prepare(
     progress("answers, checked");
     let answered = trials.answered();
     let tasks = trials.tasks(&answered.answers);
-    let funnel = funnel::prepare(&stages::input(input.setting, &case.spec), progress);
+    let funnel = funnel::prepare(&stages(input.setting, &case.spec), progress);
     let funnel = funnel.map_err(|error| error.to_string());
     Ok(Prepared {
         plan: TrialPlan {
@@ -158,7 +154,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
     };
     if let Some(of_stages) = &plan.stages {
-        let found = funnel::time(&stages::input(input.setting, &case.spec), of_stages)?;
+        let found = funnel::time(&stages(input.setting, &case.spec), of_stages)?;
         times.ln_ns.extend(found.ln_ns);
     }
     Ok(times)

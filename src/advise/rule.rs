@@ -4,10 +4,8 @@
 use serde::Serialize;
 
 use super::change::Change;
-use super::choice::{StructureChoice, TestChoice};
-use super::motion::MotionChoice;
-use super::omission::{By, Check, Decision, is_longer, of_costs};
-use super::trials::{Answered, Sides, Trials};
+use super::choice::{MotionChoice, StructureChoice, TestChoice};
+use super::trials::{Answered, By, Check, Decision, Sides, Trials, is_longer, of_costs};
 use crate::funnel::FunnelReport;
 use crate::measure::OverProcesses;
 
@@ -204,10 +202,7 @@ impl Omission {
 }
 
 #[cfg(test)]
-pub use tests::some_rule;
-
-#[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
 
     /// A rule that enters nothing.

@@ -5,12 +5,14 @@
 
 use std::ops::Deref;
 
+use serde::Serialize;
+
 use super::case::Case;
-use super::omission::{Check, Side};
 use crate::culling::CameraView;
 use crate::index::DynIndex;
 use crate::measure::{Answer, Ask, OverProcesses, TimedTask};
 use crate::query::ItemId;
+use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
 
 /// The task that all others are compared with: the fastest tree, six planes, f32.
@@ -154,5 +156,179 @@ impl Sides {
             on: self.on,
             same_answers: answered.answers[self.kept] == answered.answers[self.left_out],
         }
+    }
+}
+
+/// Two times are a tie unless the interval of their ratio lies beyond this.
+///
+/// The layout of memory and code alone makes differences of some percent, which the next
+/// run on the same machine may reverse.
+pub(super) const TIE: f64 = 1.05;
+
+/// Returns true if the first of two times is the longer one, from their ratio.
+///
+/// `None` for a tie. Without an interval the value decides.
+pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
+    match (ratio.lower, ratio.upper) {
+        (Some(lower), Some(upper)) => {
+            (lower > TIE || upper < 1.0 / TIE).then_some(ratio.value > 1.0)
+        }
+        _ => Some(ratio.value > 1.0),
+    }
+}
+
+/// Ratio of two costs from the ratio of the times in them.
+///
+/// Each cost is given behind its time.
+pub(super) fn of_costs(times: Estimate, own: [f64; 2], other: [f64; 2]) -> Estimate {
+    let ([own_ns, own], [other_ns, other]) = (own, other);
+    let of = |ratio: f64| (ratio * other_ns + own - own_ns) / other;
+    Estimate {
+        value: own / other,
+        lower: times.lower.map(of),
+        upper: times.upper.map(of),
+    }
+}
+
+/// Decision about a feature.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decision {
+    /// It costs more than it saves.
+    LeaveOut,
+    /// It pays, or nothing shows that it does not.
+    Keep,
+    /// The scene or the path has nothing of the kind.
+    NotApplicable,
+}
+
+/// The judge of a rule.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum By {
+    /// Both sides answer the same: the clock, and the rule where that is a tie.
+    Time,
+    /// The sides differ in more than time: the rule.
+    Rule,
+}
+
+/// Times and answers with the work of a rule (kept) and without it (left out).
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Check {
+    /// The structure or the work that was measured.
+    pub on: String,
+    /// With the work.
+    pub kept: Side,
+    /// Without it.
+    pub left_out: Side,
+    /// Time with it / time without: above 1, leaving out is faster.
+    ///
+    /// `None` without times.
+    #[serde(flatten, serialize_with = "flat::ratio")]
+    pub ratio: Option<Estimate>,
+    /// `true` if every camera got the same set from both.
+    pub same_answers: bool,
+}
+
+/// One side of a check; errors are null without a comparison with the truth.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Side {
+    /// Thread CPU time of a camera, mean over cameras and processes, ns.
+    pub ns: f64,
+    /// False positives / visible items.
+    pub excess: Option<f64>,
+    /// Mean of the judged cameras.
+    pub false_positives_per_query: Option<f64>,
+    /// Visible items that were not returned, in millionths.
+    pub false_negative_ppm: Option<f64>,
+}
+
+impl Check {
+    /// Times alone, of two sides with the same answers.
+    pub(super) fn of_times(on: String, ns: [f64; 2], ratio: Option<Estimate>) -> Check {
+        let [kept, left_out] = ns.map(|ns| Side {
+            ns,
+            ..Side::default()
+        });
+        Check {
+            on,
+            kept,
+            left_out,
+            ratio,
+            same_answers: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rule::tests::some_rule;
+    use super::super::rule::{Finding, Omission};
+    use super::*;
+
+    /// A check with a ratio of times and what each side misses.
+    fn check(ratio: f64, missed: [f64; 2]) -> Check {
+        let times = Some(Estimate::exact(ratio));
+        let mut check = Check::of_times("wide".to_owned(), [ratio * 100.0, 100.0], times);
+        check.kept.false_negative_ppm = Some(missed[0]);
+        check.left_out.false_negative_ppm = Some(missed[1]);
+        check
+    }
+
+    fn settled(by: By, statistic: f64, check: Check) -> Omission {
+        some_rule(by).omission(Finding::new(statistic, 1.0, ""), Some(check))
+    }
+
+    #[test]
+    fn the_clock_decides_where_it_can_and_the_rule_where_it_cannot() {
+        let (small, large) = (0.5, 2.0);
+        let of = |statistic, ratio: f64, ends| {
+            let mut check = check(ratio, [0.0; 2]);
+            check.ratio = Some(Estimate::within(ratio, ends));
+            settled(By::Time, statistic, check).decision
+        };
+        let (slower, faster) = ([1.1, 1.3], [0.7, 0.9]);
+        assert_eq!(of(small, 1.2, slower), Decision::LeaveOut);
+        assert_eq!(of(large, 1.2, slower), Decision::LeaveOut);
+        assert_eq!(of(small, 0.8, faster), Decision::Keep);
+        assert_eq!(of(large, 0.8, faster), Decision::Keep);
+        let tie = [0.9, 1.1];
+        assert_eq!(of(small, 1.0, tie), Decision::LeaveOut);
+        assert_eq!(of(large, 1.0, tie), Decision::Keep);
+    }
+
+    #[test]
+    fn where_more_than_time_differs_the_rule_decides() {
+        for (statistic, wanted) in [(0.5, Decision::LeaveOut), (2.0, Decision::Keep)] {
+            for ratio in [1.5, 0.5] {
+                let mut check = check(ratio, [0.0; 2]);
+                check.same_answers = false;
+                let omission = settled(By::Rule, statistic, check);
+                assert!(omission.decision == wanted && !omission.is_wrong());
+            }
+        }
+    }
+
+    #[test]
+    fn what_would_be_missed_is_kept_however_fast() {
+        let blind = check(6.0, [1.0, 2.0]);
+        let mut other = check(6.0, [0.0; 2]);
+        other.same_answers = false;
+        for (by, check) in [(By::Time, &blind), (By::Rule, &blind), (By::Time, &other)] {
+            let omission = settled(by, 0.5, check.clone());
+            assert_eq!(omission.decision, Decision::Keep, "{check:?}");
+            assert!(omission.reason.contains("missed"));
+        }
+        let omission = settled(By::Time, 0.5, check(6.0, [2.0; 2]));
+        assert_eq!(omission.decision, Decision::LeaveOut);
+    }
+
+    #[test]
+    fn a_rule_without_a_statistic_does_not_apply() {
+        let rule = some_rule(By::Time);
+        let omission = rule.omission(Finding::none("for a reason"), None);
+        assert_eq!(omission.decision, Decision::NotApplicable);
+        assert_eq!((omission.statistic, omission.saving), (None, None));
+        let omission = rule.omission(Finding::new(3.0, f64::INFINITY, ""), None);
+        assert_eq!(omission.decision, Decision::LeaveOut);
     }
 }

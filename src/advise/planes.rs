@@ -5,11 +5,10 @@ use std::rc::Rc;
 use anyhow::bail;
 use glam::DVec3;
 
-use super::super::case::part_of;
-use super::super::choice::TestChoice;
-use super::super::options::{NO_NODES, TOLERANCE};
-use super::super::rule::{Draft, Finding};
-use super::super::trials::{BASE, Sides, Trials};
+use super::case::{NO_NODES, TOLERANCE, part_of};
+use super::choice::TestChoice;
+use super::rule::{Draft, Finding};
+use super::trials::{BASE, Sides, Trials};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
@@ -25,7 +24,7 @@ const MOST_NEEDED: f64 = 0.99;
 /// Planes that the whole scene lies within: a camera does not need them.
 ///
 /// The far plane first of all, which paths often put behind the scene.
-pub(super) fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let bounds = &case.scene().bounds;
     let (mut needed, mut all) = (0, 0);
@@ -68,7 +67,7 @@ const COUNTED: usize = 64;
 ///
 /// The mask of open planes that a node passes to its children leaves them out. The side
 /// with them is a view whose nodes never close a plane (unless they close all).
-pub(super) fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
     let input = Input::new(&case.scene().items);
@@ -150,7 +149,7 @@ impl QueryVolume for Unmasked<'_> {
 ///
 /// The exact test adds them. They cost test time and save the drawing of what cannot be
 /// seen.
-pub(super) fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
     Ok(Draft::concluded(sides, move |facts, check| {
@@ -199,7 +198,7 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides>
 ///
 /// f32 planes, moved outward for their rounding, miss nothing either, and let through a
 /// margin that is mostly far too thin to hold an item.
-pub(super) fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
@@ -219,7 +218,7 @@ fn of_margin(margin: f64) -> Finding {
 ///
 /// Near the world's origin f32 has digits enough without. One side has the scene about its
 /// centre, the other about the world's origin.
-pub(super) fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let scene = case.scene();
     if case.workload.around != scene.surroundings() {
@@ -248,8 +247,8 @@ pub(super) fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::{By, Decision};
-    use super::super::super::rule::some_rule;
+    use super::super::rule::tests::some_rule;
+    use super::super::trials::{By, Decision};
     use super::*;
     use crate::geometry::Plane;
     use glam::Vec3;

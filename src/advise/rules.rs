@@ -1,0 +1,326 @@
+//! The rules of omission, a function each, which enters both sides of a rule.
+//!
+//! Rules about structures, their updates and the camera's frame; rules about the stages
+//! behind the frustum, which read a funnel of a few views: one side removes what the other
+//! returns, so the drawing that this saves is weighed against the time that it takes.
+
+use std::slice;
+
+use super::case::{NO_NODES, TOLERANCE, default_of};
+use super::change::Axis;
+use super::choice::{ns, over, policy_of};
+use super::planes;
+use super::rule::{Draft, Finding, Rule};
+use super::trials::By::{Rule as Statistic, Time};
+use super::trials::{BASE, Check, Sides, Trials, is_longer};
+use crate::drift::walk;
+use crate::funnel::StageKind::{self, Fragment, Occlusion, Region, Triangle};
+use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE};
+use crate::index::StructureSpec;
+use crate::measure::Setting;
+use crate::shown::{count, counted, significant};
+use crate::visibility::SampleGrid;
+
+/// All rules: name, work to leave out; statistic; decision.
+pub(super) const RULES: &[Rule] = rows! {
+    Rule { name, left_out, statistic_name, by, enter }
+    "needless-planes", "every plane",
+        "share of all planes that the n-vertex of the scene's bounds is not inside of",
+        Time, planes::needless_planes;
+    "plane-masks", "inherited planes", "share of the plane tests that masks do not save",
+        Time, planes::plane_masks;
+    "no-index", "index", "items", Time, no_index;
+    "six-planes", "axes beyond planes", "cost of drawing what six planes let through, ns a query",
+        Statistic, planes::six_planes;
+    "regions", "portals",
+        "share of the items left by the other stages that lie in no region that is seen",
+        Statistic, |_| reads(Region);
+    "occlusion", "occlusion culling",
+        "share of the items left by the other stages that others hide",
+        Statistic, |_| reads(Occlusion);
+    "cones", "normal cones", "share of the triangles of the items left whose cluster faces away",
+        Statistic, |_| reads(Triangle);
+    "sorting", "depth sorting",
+        "share of the shaded fragments that an early z-test saves once items are sorted",
+        Statistic, |_| reads(Fragment);
+    "third-dimension", "third dimension", "height of the scene", Time, third_dimension;
+    "rebasing", "rebasing", "margin for rounding in world coordinates / depth of the view",
+        Statistic, planes::rebasing;
+    "rebuild", "rebuilds", "time of a frame without rebuilds, ns",
+        Statistic, |_| rebuild();
+    "f64-kernel", "double precision", "margin for rounding to f32 / depth of the view",
+        Statistic, planes::f64_kernel;
+    "frame-correction", "basis correction", "error of the axes after all steps of the path",
+        Statistic, frame_correction;
+};
+
+/// The index itself: below some number of items a scan is as fast.
+///
+/// The number follows from the parts of the scene that are measured beside it
+/// ([`Axis::Items`]).
+fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
+    let case = trials.case;
+    let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
+    let items = &case.scene().items;
+    let whole = trials.index(case.scan.build(items)?, &case.workload.views[..]);
+    let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
+    let sides = Sides::new(format!("{tree} against {scan}{place}"), BASE, whole);
+    let all = items.len() as f64;
+    Ok(Draft::concluded(sides, move |facts, check| {
+        let taken = facts.structure;
+        // Follows the structure taken, wherever there was a choice.
+        let [tree, fastest] = taken.tree_and_scan();
+        let both = tree.zip(fastest);
+        let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
+        let ratio = both.and_then(|(tree, scan)| over(tree, scan));
+        let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
+        let alone = check.filter(|_| costs.is_none());
+        let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
+        let below = change.and_then(|change| change.below.as_ref());
+        // Smaller parts are not measured once another structure is ahead.
+        let least = below.map(|turn| turn.upper);
+        let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
+        let scan_wins = alone.map_or(taken.is_scan(), wins);
+        let below = below.filter(|turn| turn.structure == scan && alone.is_none());
+        let crossing = match below {
+            _ if scan_wins => all,
+            Some(turn) => turn.at,
+            None => 0.0,
+        };
+        let least = least.or(change.map(|change| change.measured[0]));
+        let reason = match crossing {
+            _ if costs.is_none() => format!("by all items alone{place}"),
+            // A scan that ties with a tree wins nowhere.
+            _ if taken.is_scan() && is_tie == Some(true) => "a scan and a tree tie".to_owned(),
+            0.0 => format!(
+                "no scan wins from {} items on",
+                count(least.unwrap_or(all) as usize)
+            ),
+            _ => format!(
+                "a scan wins up to {}",
+                counted(crossing.round() as usize, "item")
+            ),
+        };
+        Finding {
+            cost_ns: costs,
+            leaves_out: costs.map(|_| taken.is_scan()),
+            is_tie,
+            ..Finding::new(all, crossing, reason)
+        }
+    }))
+}
+
+/// The third dimension of the cells.
+///
+/// An octree's third split separates nothing in a scene that is flatter than a quadtree's
+/// leaves are wide. Bounds stay three-dimensional either way.
+fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
+    let case = trials.case;
+    let (scene, by) = (case.scene(), case.spec.execution);
+    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
+    let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
+    let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
+    let mut extents = extent.to_array();
+    extents.sort_by(f64::total_cmp);
+    let [height, widths @ ..] = extents;
+    let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
+    let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
+        .map(|index| trials.index(index, &case.workload.views[..]));
+    let sides = Sides::new("octree against quadtree", kept, left_out);
+    Ok(Draft::concluded(sides, move |facts, _| {
+        if facts.structure.is_scan() {
+            return Finding::none(NO_NODES);
+        }
+        let taken = facts.structure.name.as_deref().unwrap_or_default();
+        let flat = taken.starts_with("quadtree");
+        let is_either = flat || taken.starts_with("octree");
+        let is_either = is_either && facts.structure.ties.is_empty();
+        Finding {
+            leaves_out: is_either.then_some(flat),
+            ..Finding::new(height, cell, "octree against quadtree")
+        }
+    }))
+}
+
+/// A rebuild in every frame of a motion, against refits alone.
+///
+/// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly.
+fn rebuild() -> anyhow::Result<Draft> {
+    Ok(Draft::concluded(None, |facts, _| {
+        let Some(motion) = facts.motion else {
+            return Finding::none("nothing moves without --motion");
+        };
+        let cell = |policy| {
+            let mut ranked = motion.policies.iter().filter(|cell| cell.rank.is_some());
+            ranked.find(|cell| policy_of(&cell.structure) == policy)
+        };
+        let ruled_out = motion.ruled_out.first();
+        if let Some((&(_, frames), refitted)) = ruled_out.zip(cell("refit").and_then(ns)) {
+            let builds = frames * refitted;
+            return Finding {
+                cost_ns: Some([builds, refitted]),
+                ..Finding::new(refitted, builds, "its builds alone")
+            };
+        }
+        let both = cell("rebuild").zip(cell("refit"));
+        let costs = both.and_then(|(kept, left_out)| Some([ns(kept)?, ns(left_out)?]));
+        let Some(((rebuilt, refitted), [kept, left_out])) = both.zip(costs) else {
+            return Finding::none("not both policies were measured");
+        };
+        let (on, ratio) = (&refitted.structure, over(rebuilt, refitted));
+        let check = Check::of_times(format!("frames of {on}"), [kept, left_out], ratio);
+        Finding {
+            check: Some(check),
+            ..Finding::new(left_out, kept, "rebuilt in every frame")
+        }
+    }))
+}
+
+/// Correcting a camera's frame, by a polar Newton step every 100 steps.
+///
+/// Axes in f32 that are turned and never straightened drift by some 5e-8 a step: a walk of
+/// as many steps says how far. A frame that is built for each camera does not need it.
+fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
+    let path = trials.case.path;
+    let steps = path.cameras.len() + path.left_out;
+    let [(error, without), (_, with)] =
+        ["f32", "f32-polar-100"].map(|method| walk(method, steps as u64));
+    let [kept, left_out] = [with, without].map(|ask| trials.enter(false, ask));
+    // That of a basis that is lost is infinite.
+    let error = error.unwrap_or(f64::INFINITY);
+    let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
+    let finding = Finding::new(error, TOLERANCE, reason);
+    let sides = Sides::new("500 steps of a frame", kept, left_out);
+    Ok(Draft::new(sides, finding))
+}
+
+/// Most views, and most items of all of them.
+const VIEWS: usize = 8;
+const ITEMS: usize = 100_000;
+/// Samples of a view and of the occlusion buffer; of the image that is shaded.
+const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
+const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
+
+/// The stages on a tree.
+pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'s> {
+    let most = (ITEMS / setting.scene.items.len().max(1)).clamp(1, VIEWS);
+    let structures = slice::from_ref(tree);
+    let chain = Chain::for_scene(&setting.scene, structures, false)
+        .with(StageKind::Triangle, "several-cones")
+        .with(StageKind::Fragment, NONE);
+    FunnelInput {
+        structures,
+        all: false,
+        picks: false,
+        sorted: true,
+        ..FunnelInput::new(setting, chain, (most, SAMPLES), tree.execution)
+    }
+}
+
+/// Cost of shading a fragment, ns: an image of 1920 x 1080 in 2 ms.
+const SHADE_NS: f64 = 1.0;
+
+/// A rule about a stage; where the funnel has none it does not apply, for a reason.
+fn reads(stage: StageKind) -> anyhow::Result<Draft> {
+    Ok(Draft::concluded(None, move |facts, _| {
+        let funnel = facts.funnel.as_ref().map_err(String::clone);
+        let found = funnel.and_then(|funnel| finding(funnel, stage, facts.draw_ns));
+        found.unwrap_or_else(Finding::none)
+    }))
+}
+
+/// The gain of a stage, weighed; of the fragment stage, that of sorting.
+fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Finding, String> {
+    let gain = |stage| funnel.gains.iter().find(|gain| gain.stage == stage);
+    let mut left_out = funnel.left_out.iter();
+    let is_own = |section, name| match stage {
+        StageKind::Fragment => section == "orders",
+        _ => name == stage.name(),
+    };
+    let own = gain(stage).ok_or_else(|| {
+        let row = left_out.find(|row| is_own(row.section, row.name));
+        let none = "the scene has no rooms or sectors that portals join";
+        row.map_or(none, |row| &row.reason).to_owned()
+    })?;
+    let items = gain(StageKind::Occlusion).map_or(f64::NAN, |gain| gain.with_count);
+    let of_item = own.without_count / items;
+    let large = SHADED.samples() as f64 / SAMPLES.samples() as f64;
+    Ok(match stage {
+        StageKind::Triangle => weigh(own, "triangle", 1.0, draw_ns / of_item),
+        StageKind::Fragment => weigh(own, "fragment", large, SHADE_NS),
+        _ => weigh(own, "item", 1.0, draw_ns),
+    })
+}
+
+/// Leaves out where removing takes longer than drawing the removed candidates.
+///
+/// A counted candidate, `one`, stands for `scale` of them; one that is not removed costs
+/// `cost_ns`.
+fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
+    let [with, without] = [gain.with_count, gain.without_count].map(|n| n * scale);
+    if without == 0.0 {
+        return Finding::none(format!("no {one} is in any view that was looked at"));
+    }
+    let removed = without - with;
+    let left_out_ns = gain.without_ns.unwrap_or(f64::NAN);
+    let ratio = gain.ratio.map_or(f64::NAN, |ratio| ratio.value);
+    let kept_ns = ratio * left_out_ns;
+    let testing = kept_ns - left_out_ns;
+    let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
+    let pays_from = from.map(|ns| format!(", pays from {}", significant(ns)));
+    let pays = (testing / (cost_ns * without)).max(0.0);
+    let reason = format!(
+        "{} ns/{one}{}",
+        significant(cost_ns),
+        pays_from.unwrap_or_default()
+    );
+    let on = format!("{} {}, as in funnel", gain.stage.name(), gain.back_end);
+    let check = Check {
+        same_answers: gain.unit == "fragments" || removed == 0.0,
+        ..Check::of_times(on, [kept_ns, left_out_ns], gain.ratio)
+    };
+    Finding {
+        check: Some(check),
+        cost_ns: Some([kept_ns + with * cost_ns, left_out_ns + without * cost_ns]),
+        ..Finding::new(removed / without, pays, reason)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rule::Omission;
+    use super::super::rule::tests::some_rule;
+    use super::super::trials::{By, Decision};
+    use super::*;
+    use crate::statistics::Estimate;
+
+    fn settled([with_count, without_count]: [f64; 2], ratio: f64, cost_ns: f64) -> Omission {
+        let counts = [with_count, without_count];
+        let named = ("rays", "items");
+        let mut gain = Gain::new(StageKind::Occlusion, named, counts, Default::default());
+        (gain.without_ns, gain.ratio) = (Some(100.0), Some(Estimate::exact(ratio)));
+        some_rule(By::Rule).omission(weigh(&gain, "thing", 1.0, cost_ns), None)
+    }
+
+    #[test]
+    fn a_stage_is_left_out_where_it_takes_longer_than_what_it_saves() {
+        // 200 ns for 40 of 50: pays above 5 ns each.
+        let dear = settled([10.0, 50.0], 3.0, 5.1);
+        assert_eq!(dear.decision, Decision::Keep);
+        assert_eq!(dear.statistic, Some(0.8));
+        assert!((dear.threshold.unwrap() - 200.0 / 255.0).abs() < 1e-12);
+        assert_eq!(dear.reason, "5.10 ns/thing, pays from 5.00");
+        // A cost that is not 0 is not shown as 0.
+        let little = settled([0.0, 1e6], 1.1, 1.0);
+        assert_eq!(little.reason, "1.00 ns/thing, pays from 0.0000100");
+        let cheap = settled([10.0, 50.0], 3.0, 4.9);
+        assert_eq!(cheap.decision, Decision::LeaveOut);
+        // It costs 300 + 49 with and 100 + 245 without.
+        assert!((cheap.saving.unwrap() - (1.0 - 345.0 / 349.0)).abs() < 1e-12);
+        let of_all = |ratio| settled([50.0, 50.0], ratio, 1e9).decision;
+        assert_eq!([3.0, 0.5].map(of_all), [Decision::LeaveOut; 2]);
+        let nothing = settled([0.0, 0.0], 3.0, 1.0);
+        assert_eq!((nothing.statistic, nothing.threshold), (None, None));
+        assert!(nothing.reason.contains("no thing"), "{}", nothing.reason);
+    }
+}
