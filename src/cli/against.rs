@@ -15,10 +15,11 @@ use serde_json::json;
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side};
 use super::processes::{Job, Message, Workers};
+use super::run_plan::{self, RunPlan};
 use super::run_resume::TypedOptions;
 use super::shared_args::WhatArgs;
 use super::study::{progress, tell_progress};
-use super::{interrupt, run_plan, text};
+use super::{interrupt, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
@@ -71,10 +72,7 @@ pub fn compare_against<'a>(
     let busy = Machine::capture().busy().filter(|_| is_timed);
     let (changes, head) = duel.run()?;
     let note = |busy| format!("{busy}: both sides suffered alike, and it may take more pairs");
-    let left_out = match plan.structures == STRUCTURES {
-        true => left_out(registry, &args.what, &plan.plan)?,
-        false => None,
-    };
+    let left_out = left_out(registry, &args.what, &plan)?;
     Ok(CompareTable {
         args,
         old,
@@ -88,15 +86,16 @@ pub fn compare_against<'a>(
 }
 
 /// Line on the default structures of a run that a comparison lacks.
-fn left_out(registry: &Registry, args: &WhatArgs, plan: &Plan) -> anyhow::Result<Option<String>> {
+fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> anyhow::Result<Option<String>> {
     let default = registry.structures(args.moves.list(DEFAULT))?.into_iter();
     // As labels stand before a policy of updates.
-    let compared = plan.structures.iter();
+    let compared = of.plan.structures.iter();
     let compared: Vec<_> = compared.map(|s| s.label.split('@').next()).collect();
     let is_in = |name: &String| compared.contains(&Some(name));
     let names = text::joined(default.map(|spec| spec.label).filter(|name| !is_in(name)));
     let (note, more) = ("not compared by default", "(--structure default takes all)");
-    Ok((!names.is_empty()).then(|| format!("{note}: {names} {more}")))
+    let is_default = of.structures == STRUCTURES && !names.is_empty();
+    Ok(is_default.then(|| format!("{note}: {names} {more}")))
 }
 
 /// The program of a name, as in a shell: one without a folder is looked up in PATH.
@@ -273,8 +272,8 @@ impl Duel<'_> {
                     }
                     Ok(())
                 };
-                let workers = &self.sides[side];
-                let ended = workers.see_through(0, job(scene, share), &mut keep, &|_| ())?;
+                let (workers, job) = (&self.sides[side], Job::scene(scene, share, false));
+                let ended = workers.see_through(0, job, &mut keep, &|_| ())?;
                 let named = || workers.program.display().to_string();
                 ended.done().with_context(named)?;
             }
@@ -315,7 +314,8 @@ impl Duel<'_> {
         let mut workers = [None, None];
         for side in [first, 1 - first] {
             let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
-            let mut worker = self.sides[side].start(0, rng.random(), job(scene, share))?;
+            let job = Job::scene(scene, share, false);
+            let mut worker = self.sides[side].start(0, rng.random(), job)?;
             // A side is held for half of the time.
             worker.patience = worker.patience.saturating_mul(2);
             workers[side] = Some(worker);
@@ -350,14 +350,6 @@ impl Duel<'_> {
             }
         }
         Ok(parts)
-    }
-}
-
-fn job(scene: usize, share: Share) -> Job {
-    Job::Scene {
-        scene,
-        share,
-        samples: false,
     }
 }
 

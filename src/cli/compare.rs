@@ -9,14 +9,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
-use super::cell_names::{name, place};
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side, change_of, counted, reason};
 use super::diagram::{Row, rows};
 use super::figure::{Axis, Figure, LINE, is_drawn, line};
 use super::page::to_page;
 use super::run_resume::newest_run;
-use super::run_table::short;
+use super::run_table::{name, place, short};
 use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_if};
 use crate::index::Registry;
 use crate::measure::Status;

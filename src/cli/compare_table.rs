@@ -5,12 +5,10 @@ use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
-use super::cell_names::{name, place, question, short_structure};
 use super::command_args::{CompareArgs, Gate};
-use super::document::{Block, folded, to_markdown, to_terminal};
-use super::run_table::{distinct, short};
+use super::document::{Block, Table, folded, to_markdown, to_terminal};
+use super::run_table::{distinct, name, place, question, short, short_structure};
 use super::shared_args::TableFormat;
-use super::table::Table;
 use super::{Ending, print_json, program, text};
 use crate::measure::{GroupKey, METRICS};
 use crate::report::{
@@ -303,10 +301,10 @@ impl CompareTable<'_> {
             rows => format!("{} of {cells}", text::counted(rows, "figure")),
         };
         let alone = changes.only_in_new.iter();
-        let alone = match alone.filter(|cell| cell.status.is_failure()).count() {
-            0 => String::new(),
-            wrong => format!("; {} only in NEW", text::counted(wrong, "wrong answer")),
-        };
+        let wrong = alone.filter(|cell| cell.status.is_failure()).count();
+        let alone = text::any(wrong, "wrong answer", |wrong| {
+            format!("; {wrong} only in NEW")
+        });
         format!("{} of {rows}{alone}", text::joined(counts))
     }
 

@@ -119,7 +119,11 @@ impl<'d> Diagram<'d> {
             own
         });
         let classes: Vec<String> = classes.collect();
-        let named = names.iter().map(|(name, end, at)| beside(name, *end, *at));
+        // A name beside the plot, with a line that leads to it.
+        let named = names.iter().map(|(name, [x, y], at)| {
+            let (lead, name) = (line("lead", [*x, 100.0], [*y, at - 4.0]), html(name));
+            format!("{lead}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{name}</text>")
+        });
         let named: Vec<String> = named.collect();
         let is_apart = self.joined == Joined::Apart;
         // The strongest are drawn last, in front of the others.
@@ -240,13 +244,6 @@ impl<'d> Diagram<'d> {
         let lines = self.series.len().min(STRONG + 2).div_ceil(4);
         (parts, LINE * lines as f64)
     }
-}
-
-/// A name beside the plot, with a line that leads to it.
-fn beside(name: &str, end: [f64; 2], at: f64) -> String {
-    let lead = line("lead", [end[0], 100.0], [end[1], at - 4.0]);
-    let name = html(name);
-    format!("{lead}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{name}</text>")
 }
 
 /// Width of the plot on the narrowest page, px.

@@ -3,12 +3,11 @@
 
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
-use super::document::{Block, show};
+use super::document::{Block, Column, Table, show};
 use super::figure::{Axis, Figure, Look, ends, is_drawn, picture};
 use super::page::to_page;
 use super::processes::Timing;
 use super::study::{ROUNDS, Study};
-use super::table::{Column, Table};
 use super::text::{self, some, time_plus_minus};
 use super::{Ending, expect_places, print, write_if};
 use crate::drift::{

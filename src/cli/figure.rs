@@ -31,18 +31,15 @@ pub fn is_drawn(value: f64) -> bool {
 
 /// Ends of an interval that have a place on a logarithmic axis.
 pub fn ends(value: Estimate) -> Option<[f64; 2]> {
-    value
-        .ends()
-        .filter(|ends| ends.iter().all(|end| is_drawn(*end)))
+    let ends = value.ends();
+    ends.filter(|ends| ends.iter().all(|end| is_drawn(*end)))
 }
 
 /// Note in a caption on points that are not drawn.
 pub fn left_out(count: usize) -> String {
-    let points = text::counted(count, "point");
-    match count {
-        0 => String::new(),
-        _ => format!(" ({points} beyond the axis left out)"),
-    }
+    text::any(count, "point", |points| {
+        format!(" ({points} beyond the axis left out)")
+    })
 }
 
 /// One axis: its title, range, and the text of a tick.
@@ -320,9 +317,8 @@ pub fn picture(figures: &[Figure], columns: usize) -> String {
     let width = width * columns.min(figures.len()).max(1) as f64;
     // Programs that are no browsers do not resolve variables.
     let style = include_str!("assets/figure.css").replace("var(--bg)", "#fff");
-    let style = style
-        .replace("var(--fg)", "#1b1d21")
-        .replace("var(--soft)", "#5c636e");
+    let style = style.replace("var(--fg)", "#1b1d21");
+    let style = style.replace("var(--soft)", "#5c636e");
     let style = style.replace("var(--rule)", "#d8dbe0");
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y:.0}\" \

@@ -16,6 +16,7 @@ use super::figure::{Axis, Figure};
 use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
+use super::query::cell;
 use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{ROUNDS, Study, load, note_solid};
@@ -118,7 +119,9 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
         if !known.iter().any(|row| row.name == name) {
             let stage = stage.name();
             if let [_] = known[..] {
-                let nothing = nothing_for_it(scene);
+                let why = funnel::left_out_of(scene);
+                let why = text::some(why, |row| format!(": {}", row.reason));
+                let nothing = format!("scene '{}' has nothing for that stage{why}", scene.name);
                 bail!("--{stage} is '{name}'; expected none: {nothing}");
             }
             if let Some([_, need]) = funnel::NEEDS.iter().find(|[own, _]| own == name) {
@@ -131,14 +134,6 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
         chain = chain.with(stage, name);
     }
     Ok(chain)
-}
-
-/// Reason for which a scene has no back end of a stage.
-fn nothing_for_it(scene: &Scene) -> String {
-    let why = text::some(funnel::left_out_of(scene), |row| {
-        format!(": {}", row.reason)
-    });
-    format!("scene '{}' has nothing for that stage{why}", scene.name)
 }
 
 /// Loads the scene, path and structures of the command itself, or of a worker.
@@ -185,33 +180,22 @@ pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
             row => std::slice::from_ref(row),
         };
         let mut out = csv::Writer::from_writer(Vec::new());
+        // `excess/lower` is `excess_lower`, a value needs no more.
+        let column = |path: &str| path.trim_end_matches("/value").replace('/', "_");
         let columns = fields.split_whitespace().map(column);
         let about = ["scene", "path"].map(str::to_owned).into_iter();
         out.write_record(about.chain(columns))?;
         for row in rows {
             let own = [&report.scene, &report.path].map(|name| lines(name));
             let fields = fields.split_whitespace();
-            let cells = fields.map(|path| cell(row.pointer(&format!("/{path}"))));
+            let cells = fields.map(|path| row.pointer(&format!("/{path}")));
+            let cells = cells.map(|value| text::some(value, cell));
             out.write_record(own.into_iter().chain(cells))?;
         }
         let text = String::from_utf8(out.into_inner()?)?;
         write_text(&folder.join(format!("{table}.csv")), &text)?;
     }
     Ok(())
-}
-
-/// The name of a field's column: `excess/lower` is `excess_lower`, a value needs no
-/// more.
-fn column(path: &str) -> String {
-    path.trim_end_matches("/value").replace('/', "_")
-}
-
-fn cell(value: Option<&Value>) -> String {
-    match value {
-        None | Some(Value::Null) => String::new(),
-        Some(Value::String(text)) => lines(text),
-        Some(plain) => plain.to_string(),
-    }
 }
 
 /// Items that each stage of the chain passes.
@@ -276,10 +260,8 @@ pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
         Some(Fate::Lost) => 5,
     };
     let (name, path) = (&report.scene, &report.path);
-    let items = match scene.skipped_items {
-        0 => String::new(),
-        bad => text::items(scene.items.len(), bad),
-    };
+    let bad = Some(scene.skipped_items).filter(|bad| *bad > 0);
+    let items = text::some(bad, |bad| text::items(scene.items.len(), bad));
     Plan {
         caption: text::joined([
             &format!("{name}, {path}: the first view from above"),

@@ -1,8 +1,7 @@
 //! The tables of `cullbench funnel`: a row for each stage and back end, the gain of
 //! each stage of the chain, and conclusions.
 
-use super::document::Block;
-use super::table::{Column, Table};
+use super::document::{Block, Column, Table};
 use super::text::{self, some};
 use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
 use crate::shown::shortened;
@@ -41,11 +40,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let is_unproven = row.back_end.guarantee == Guarantee::Unproven;
         is_unproven && row.back_end.stage == StageKind::Occlusion && (all || row.is_chosen)
     };
-    let loss = report
-        .stages
-        .iter()
-        .any(may_lose)
-        .then(|| [Block::line(""), Block::line("?: FN at these samples only")]);
+    let is_lossy = report.stages.iter().any(may_lose);
     let both = |row: &&StageRow| row.is_chosen && row.back_end.does_object_stage;
     if let Some(row) = report.stages.iter().find(both) {
         let what = "searches a tree of its own: its time includes the object stage.";
@@ -56,7 +51,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let stages = stages(report, true);
         blocks.extend(Block::section("Every back end of every stage", stages));
     }
-    blocks.extend(loss.into_iter().flatten());
+    blocks.extend(Block::more(!is_lossy, "?: FN at these samples only"));
     // Not every scene has all of them.
     for (heading, table) in [
         ("Occluders: boxes that hide others", occluders(report)),
@@ -172,9 +167,7 @@ fn occluders(report: &FunnelReport) -> Table {
         add(place, row.box_count, row.volume_share, row.build_ns);
     }
     if let Some(row) = &report.solid_blocks {
-        let unclosed = Some(row.unclosed_sector_count).filter(|count| *count > 0);
-        let unclosed = some(unclosed, |count| {
-            let sectors = text::counted(count, "sector");
+        let unclosed = text::any(row.unclosed_sector_count, "sector", |sectors| {
             format!(": {sectors} not closed or contradicting")
         });
         let place = format!("solid between the rooms of the map{unclosed}");

@@ -7,8 +7,8 @@ use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 
 use super::args::{EnvArgs, ListArgs, ListTopic};
+use super::document::Table;
 use super::shared_args::TableFormat;
-use super::table::Table;
 use super::{Ending, print, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
@@ -42,7 +42,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
             };
             [name, text]
         });
-        writeln!(out, "{name}\n{}", entries(rows))?;
+        writeln!(out, "{name}\n{}", text::entries(rows, text::width()))?;
         if !note.is_empty() {
             writeln!(out, "{}\n", text::wrapped(note.trim_end(), text::width()))?;
         }
@@ -73,11 +73,6 @@ fn text_of(value: &Value) -> String {
         Value::Array(words) => text::joined(words.iter().filter_map(Value::as_str)),
         other => other.to_string(),
     }
-}
-
-fn entries(rows: impl Iterator<Item = [impl Into<String>; 2]>) -> String {
-    let rows = rows.map(|row| row.map(Into::into));
-    text::entries(&rows.collect::<Vec<_>>(), text::width())
 }
 
 /// A row of a name, one further column and a summary.
@@ -136,12 +131,13 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
                 row["state"] = state.into();
                 row
             });
+            let suites = SUITES.iter().map(|s| [s.name.as_str(), &s.summary]);
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \
                  glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
                  zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{}",
                 program::name(),
-                entries(SUITES.iter().map(|s| [s.name.as_str(), &s.summary]))
+                text::entries(suites, text::width())
             );
             let rows = families.chain(meshes).chain(samples).chain(fetched);
             ("scenes", note, rows.collect())
@@ -162,7 +158,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
         ListTopic::Metrics => {
             let rows = METRICS.iter();
             let rows = rows.map(|m| row(m.name, "unit", m.unit, m.summary));
-            let bounds = entries(BOUNDS.iter().map(|b| [b.name, b.summary]));
+            let bounds = text::entries(BOUNDS.iter().map(|b| [b.name, b.summary]), text::width());
             let note = format!("Lower bounds in reports and tables (no structures):\n{bounds}");
             ("metrics", note, rows.collect())
         }

@@ -8,31 +8,23 @@
 //! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
-mod advise_table;
 mod against;
 mod args;
-mod bencher;
-mod cell_names;
 mod command_args;
 mod compare;
-mod compare_structures;
 mod compare_table;
 mod diagram;
 mod document;
 mod drift;
-mod error_figure;
 mod figure;
 mod funnel;
 mod funnel_table;
-mod history;
 mod interrupt;
 mod list;
 mod merge;
 mod page;
 mod plan;
 mod precision;
-mod precision_conclusions;
-mod precision_tables;
 mod processes;
 mod program;
 mod query;
@@ -45,19 +37,16 @@ mod run_table;
 mod run_verdict;
 mod run_why;
 mod scene;
-mod scene_draw;
 mod scene_facts;
 mod shared_args;
 mod sheet;
 mod stress;
 mod study;
 mod surface_tables;
-mod table;
 #[cfg(test)]
 mod tests_same_truth;
 mod text;
 mod verify;
-mod verify_table;
 mod view;
 mod worker;
 
@@ -164,12 +153,11 @@ fn start(registry: Registry) -> ExitCode {
         }
     }
     let checked = cli.command.expect_one_stdin();
-    let ending = checked.and_then(|()| dispatch(&registry, cli.command));
-    if ending.is_ok() {
-        tell_warnings();
-    }
-    match ending {
-        Ok(ending) => ExitCode::from(ending as u8),
+    match checked.and_then(|()| dispatch(&registry, cli.command)) {
+        Ok(ending) => {
+            tell_warnings();
+            ExitCode::from(ending as u8)
+        }
         Err(error) if error.is::<Interrupted>() => ExitCode::from(Ending::Interrupted as u8),
         // A reader who left is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
@@ -223,7 +211,7 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
-        Command::Scene(SceneCommand::Draw(args)) => scene_draw::draw(registry, &args),
+        Command::Scene(SceneCommand::Draw(args)) => scene::draw(registry, &args),
         Command::View(args) => view::view(registry, &args),
         Command::Env(args) => list::env(&args),
         Command::Worker => worker::worker(registry),

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::document::{Block, to_html};
+use super::document::{Block, Table, to_html};
 use super::figure::Figure;
 use super::run_resume::{command_line, typed_args};
-use super::table::Table;
 use super::{program, run_table, text};
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 

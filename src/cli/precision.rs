@@ -1,21 +1,25 @@
 //! `cullbench precision`: error against run time of a scene and path, and the
-//! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
-//! in `precision_tables` and `precision_conclusions`.
+//! sweeps over item size and ill-conditioned cameras behind it: tables, a figure, and
+//! what its figures say in sentences.
+
+use std::cmp::Ordering;
 
 use anyhow::Result;
 
 use super::args::PrecisionArgs;
-use super::document::{Block, show};
-use super::figure::{Figure, picture};
+use super::document::{Block, Column, Table, show};
+use super::figure::{Figure, ends, picture};
 use super::page::to_page;
-use super::precision_conclusions::is_wrong;
 use super::processes::Timing;
+use super::run_figures::{Measured, against};
 use super::study::{ROUNDS, Study, load};
-use super::text;
-use super::{Ending, expect_places, precision_conclusions, precision_tables, print, write_if};
+use super::text::{self, significant, some, time_plus_minus};
+use super::{Ending, diagram, expect_places, print, write_if};
 use crate::index::Registry;
-use crate::measure::{ProcessTimes, Setting};
-use crate::precision::{self, Precision, SWEEPS, sweep};
+use crate::measure::{ProcessTimes, Setting, Status};
+use crate::precision::{self, Names, Point, Precision, SWEEPS, Sweep, SweepRow, sweep};
+use crate::report::grouped;
+use crate::statistics::Estimate;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -47,14 +51,12 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
         let room = if args.all { usize::MAX } else { text::width() };
         show(&blocks(&outcome, args.all, room))
     });
-    let figures: Vec<Figure> = precision_conclusions::figure(&outcome)
-        .into_iter()
-        .collect();
+    let figures: Vec<Figure> = figure(&outcome).into_iter().collect();
     write_if(&args.svg, || picture(&figures, 1))?;
     write_if(&args.html, || {
         let title = format!("precision {}, {}", args.study.scene, args.study.path);
-        let told = precision_conclusions::conclusions(&outcome).into_iter();
-        let tables = precision_tables::blocks(&outcome, true, usize::MAX);
+        let told = conclusions(&outcome).into_iter();
+        let tables = tables(&outcome, true, usize::MAX);
         to_page(&title, told.map(Block::Line), figures, tables)
     })?;
     shown?;
@@ -63,9 +65,9 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
 
 /// Tables, then the conclusions.
 fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
-    let mut blocks = precision_tables::blocks(outcome, all, room);
+    let mut blocks = tables(outcome, all, room);
     blocks.push(Block::heading("Conclusions:"));
-    let told = precision_conclusions::conclusions(outcome).into_iter();
+    let told = conclusions(outcome).into_iter();
     blocks.extend(told.map(|sentence| Block::Line(format!("- {sentence}"))));
     blocks.extend(Block::more(all, "errors of every culling, sweeps: --all"));
     blocks
@@ -82,4 +84,366 @@ pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Resul
     let setting = setting(registry, args, Some(timing))?;
     let frames = args.frames as usize;
     Ok(precision::time(&setting, frames, &timing.plan()?)?)
+}
+
+pub fn conclusions(p: &Precision) -> Vec<String> {
+    let (sizes, cameras) = (of_sizes(&p.sweeps), of_cameras(&p.sweeps));
+    let others = [of_storage(p), sizes, cameras].into_iter();
+    of_points(p).into_iter().chain(others.flatten()).collect()
+}
+
+/// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
+fn is_safe(point: &&Point) -> bool {
+    let missed = point.counts.unwrap_or_default().dropped();
+    point.time.is_some() && missed == 0 && point.names.epsilon > 0.0
+}
+
+fn missed(point: &Point) -> u64 {
+    point.counts.unwrap_or_default().false_negatives
+}
+
+fn ratio(a: &Point, b: &Point) -> String {
+    let both = a.query_ns().zip(b.query_ns());
+    text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
+}
+
+/// The false positives of a point in words.
+fn extras(point: &Point) -> String {
+    match point.excess {
+        None => "nothing is visible".to_owned(),
+        excess => format!("false positives {} %", percent(excess)),
+    }
+}
+
+fn of_points(p: &Precision) -> Vec<String> {
+    let mut sound = p.points.iter().filter(is_safe);
+    let Some(fastest) = sound.clone().next() else {
+        return vec!["No point that is safe by its margin has a time.".to_owned()];
+    };
+    let (name, time) = (named(fastest), text::time_plus_minus(fastest.time));
+    let mut all = vec![format!(
+        "Fastest point that cannot miss an item: {name} at {time}, {}.",
+        extras(fastest)
+    )];
+    let extra = |point: &Point| point.counts.map(|errors| errors.false_positives);
+    let tight = sound.find(|point| extra(point) < extra(fastest));
+    if let Some(tight) = tight {
+        let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
+        all.push(format!(
+            "Fewer false positives take {times} times as long or more: {name}, {extra}."
+        ));
+    }
+    let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
+    // Cameras without rays have no pixels.
+    let by = |point: &Point| (point.worst_miss_px.unwrap_or(-1.0), missed(point));
+    let worst = unsafe_.max_by(|a, b| by(a).partial_cmp(&by(b)).unwrap_or(Ordering::Equal));
+    all.push(match worst {
+        Some(worst) => match worst.worst_miss_px {
+            Some(depth) => format!(
+                "Missed items: up to {} pixels deep ({}).",
+                text::significant(depth),
+                named(worst)
+            ),
+            None => format!("Items are missed, most by {}.", named(worst)),
+        },
+        None if p.points.iter().any(is_wrong) => {
+            "Points of right answers missed no visible item on these cameras.".to_owned()
+        }
+        None => "No point missed a visible item on these cameras.".to_owned(),
+    });
+    all
+}
+
+/// The structure itself is at fault, so that its errors are not known.
+pub fn is_wrong(point: &Point) -> bool {
+    matches!(point.status, Status::Wrong | Status::Panicked)
+}
+
+fn of_storage(p: &Precision) -> Option<String> {
+    let memory = |point: &&Point| point.memory_bytes_per_item;
+    let least = p.points.iter().filter(is_safe);
+    let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
+    let (name, bytes) = (named(least), text::significant(memory(&least)));
+    let extra = extras(least);
+    let time = text::some(least.query_ns(), text::time);
+    Some(format!(
+        "Least memory: {name} at {bytes} B/item, {extra}, {time}."
+    ))
+}
+
+fn of_sizes(rows: &[SweepRow]) -> Option<String> {
+    let [small, .., large] = Sweep::Size.values();
+    let of = |size: f64, name: &str| {
+        let mut own = rows.iter().filter(|row| row.sweep == Sweep::Size);
+        let found = own.find(|row| row.value == size && culling(&row.names) == name);
+        text::rate(found.and_then(SweepRow::error), 1.0)
+    };
+    let [planes, more] = [small, large].map(|size| of(size, "six-plane f32 c=0"));
+    let [exact, also] = [small, large].map(|size| of(size, "exact f32 c=8"));
+    (!rows.is_empty()).then(|| {
+        format!(
+            "Six planes return {planes} % false positives where a cube's edge is {small} of the \
+             frustum's depth, and {more} % at {large}; the exact test with c = 8: {exact} and \
+             {also} %."
+        )
+    })
+}
+
+/// Misses of the default over the sweeps of cameras, and the most of any over each.
+fn of_cameras(rows: &[SweepRow]) -> Option<String> {
+    let lost = |row: &SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
+    let sweeps = SWEEPS.into_iter().filter(|sweep| sweep.0 != Sweep::Size);
+    let rows = rows.iter().filter(|row| row.sweep != Sweep::Size);
+    let default = rows.clone().filter(|row| numbers(&row.names) == "f32 c=8");
+    let errors = default.filter_map(|row| row.errors);
+    let missed: u64 = errors.map(|errors| errors.false_negatives).sum();
+    let worst = sweeps.clone().filter_map(|(sweep, name, _)| {
+        let own = rows.clone().filter(|row| row.sweep == sweep);
+        let worst = own.max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
+        let (value, numbers) = (swept(worst.value), numbers(&worst.names));
+        let lost = Some(lost(worst).round() as usize).filter(|_| lost(worst) > 0.0)?;
+        let lost = text::count(lost);
+        Some(format!("{name} {value} ({numbers}, {lost} ppm)"))
+    });
+    let others = match text::joined(worst) {
+        none if none.is_empty() => "no other numbers do either".to_owned(),
+        worst => format!("others miss items, most at {worst}"),
+    };
+    rows.clone().next().map(|_| {
+        let names: Vec<&str> = sweeps.map(|sweep| sweep.1).collect();
+        let (names, missed) = (names.join(", "), text::counted(missed as usize, "item"));
+        format!("Over {names} the default (six planes, f32 c=8) misses {missed}; {others}.")
+    })
+}
+
+/// A point of a figure, if it has a time and an error.
+fn measured(point: &Point) -> Option<Measured> {
+    let missed = missed(point);
+    let (name, time) = (named(point), text::some(point.query_ns(), text::time));
+    let (rate, extra) = (point.excess?, percent(point.excess));
+    Some(Measured {
+        structure: point.structure.clone(),
+        test: point.names.test.to_owned(),
+        point: diagram::Point {
+            at: [point.query_ns()?, rate.value * 100.0],
+            ends: rate.times(100.0).ends(),
+            wide: point.time.and_then(ends),
+            note: format!("{name}: {time}, false positives {extra} %, {missed} missed"),
+            is_cross: missed > 0,
+            is_large: point.on_front,
+        },
+    })
+}
+
+/// False positives against time; `None` without any point.
+pub fn figure(p: &Precision) -> Option<Figure> {
+    let (scene, path) = (&p.scene, &p.path);
+    let caption = format!("{scene}, {path}: error against run time; dashed: misses visible items");
+    let axes = ["time per query", "false positives, % of visible"];
+    let points = p.points.iter().filter_map(measured);
+    against(&caption, axes, 3e-5, points.collect())
+}
+
+/// The Pareto front within `room` characters.
+///
+/// With `all` the errors of every culling and the sweeps too.
+fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
+    let visible = p.points.iter().find_map(|point| point.counts);
+    let visible = visible.map_or(0, |errors| errors.visible);
+    let items = text::items(p.items, p.skipped_items);
+    let cameras = text::counted(p.cameras, "camera");
+    let rounds = text::counted(p.rounds, "round");
+    let visible = text::count(visible as usize);
+    let over = text::over(p.processes, p.twin.as_ref());
+    let head = format!(
+        "{}: {items}; {}: {cameras}, {visible} visible in all; {over}; {rounds} in each",
+        p.scene, p.path
+    );
+    let mut blocks = vec![Block::Line(head)];
+    let mut add = |title: &str, table: Table, note: &str| {
+        blocks.extend(Block::section(title, table));
+        blocks.extend((!note.is_empty()).then(|| Block::line(note)));
+    };
+    if all {
+        let title = "Errors, by test, numbers and planes";
+        add(title, errors_table(&p.points), ERRORS_NOTE);
+    }
+    let title = "Pareto front of error, memory and time, fastest first";
+    let whole = front_table(p);
+    let front = whole.within(room, &["tie", "B/item", "FN ppm"]);
+    let heads = whole.header.iter();
+    let gone = match text::joined(heads.filter(|head| !front.header.contains(head))) {
+        none if none.is_empty() => none,
+        gone => format!(" Columns that do not fit here: {gone}."),
+    };
+    add(title, front, &(FRONT_NOTE.to_owned() + &gone));
+    if all && !p.sweeps.is_empty() {
+        for (sweep, name, what) in SWEEPS {
+            let rows = p.sweeps.iter().filter(|row| row.sweep == sweep);
+            let (table, note) = swept_errors(&rows.collect::<Vec<_>>());
+            let title = match sweep {
+                Sweep::Size => format!("False positives (% of visible) by {name} ({what})"),
+                _ => format!("Missed visible items (ppm) by {name} ({what}), nothing rebased"),
+            };
+            add(&title, table, &note);
+        }
+    }
+    let failed = p.points.iter().filter_map(|point| {
+        let why = format!("{}: {}", point.status.name(), point.reason.as_ref()?);
+        Some((why, named(point)))
+    });
+    let line = |(why, names): (String, Vec<String>)| match &names[..] {
+        [first, _, ..] => format!("{} points, such as {first}: {why}", names.len()),
+        _ => format!("{}: {why}", names.concat()),
+    };
+    blocks.extend(grouped(failed).into_iter().map(line).map(Block::Line));
+    blocks
+}
+
+/// Explanation of the errors.
+const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none observed, 95 % upper \
+     bound 3/n. FP: false positives, % of the visible items; by source: storage/planes/test, of all \
+     cameras. px: how deep the deepest miss reaches into a view 1080 pixels high. \
+     c is the factor of the conservative epsilon. All structures have the same errors.";
+
+/// Meaning of the front.
+const FRONT_NOTE: &str = "No other point is significantly better in an error, the depth of misses, \
+     memory or time and as good in the rest (intervals paired by camera and by process). c: factor \
+     of the conservative epsilon. FP: false positives, % of the visible items; FN: visible items \
+     missed, millionths; <: none observed, 95 % upper bound.";
+
+pub fn named(point: &Point) -> String {
+    format!("{} with {}", structure(point), culling(&point.names))
+}
+
+/// A culling in short.
+pub fn culling(names: &Names) -> String {
+    format!("{} {}", names.test, numbers(names))
+}
+
+/// Numbers, planes where they are not the frame's, and epsilon.
+pub fn numbers(names: &Names) -> String {
+    let arithmetic = names.arithmetic;
+    let planes = Some(names.planes).filter(|planes| *planes != "frame");
+    let planes = some(planes, |planes| format!(" {planes}"));
+    let epsilon = (arithmetic != "f64").then_some(names.epsilon);
+    let epsilon = some(epsilon, |c| format!(" c={c}"));
+    format!("{arithmetic}{planes}{epsilon}")
+}
+
+pub fn percent(rate: Option<Estimate>) -> String {
+    text::rate(rate, 100.0)
+}
+
+/// Errors of each culling, the same on every structure.
+fn errors_table(points: &[Point]) -> Table {
+    let all = grouped(points.iter().map(|p| (&p.names, p)));
+    let mut points: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
+    points.sort_by_key(|p| (p.names.test, culling(&p.names)));
+    let columns: &[Column<&Point>] = &[
+        ("culling", |p| culling(&p.names)),
+        (">FP %", |p| match p.counts {
+            None => p.status.name().to_owned(),
+            Some(_) => percent(p.excess),
+        }),
+        (">by source", |p| some(p.counts, text::sources)),
+        (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
+        (">px", |p| some(p.worst_miss_px, significant)),
+    ];
+    Table::with(points, columns)
+}
+
+fn front_table(p: &Precision) -> Table {
+    let columns: &[Column<&Point>] = &[
+        ("structure", |p| structure(p)),
+        ("culling", |p| culling(&p.names)),
+        (">query", |p| time_plus_minus(p.time)),
+        (">FP %", |p| percent(p.excess)),
+        (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
+        (">B/item", |p| format!("{:.1}", p.memory_bytes_per_item)),
+        ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
+    ];
+    let points = p.front.iter().map(|&i| &p.points[i]);
+    Table::with(points, columns).without_empty_columns()
+}
+
+/// The structure without its parameters.
+fn structure(point: &Point) -> String {
+    let name = point.structure.split(':').next();
+    name.unwrap_or_default().to_owned()
+}
+
+/// A value of a sweep: as a power of two where it is a large one.
+pub fn swept(value: f64) -> String {
+    match value {
+        power if power >= 1024.0 && power.log2().fract() == 0.0 => format!("2^{}", power.log2()),
+        plain if plain == 0.0 || (1e-3..1e3).contains(&plain) => plain.to_string(),
+        _ => format!("{value:e}"),
+    }
+}
+
+/// Table of the cullings that have any error, and a line on the others.
+fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
+    type Named = fn(&Names) -> String;
+    let ([header, nothing, unit], name): (_, Named) = match rows[0].sweep {
+        Sweep::Size => (["culling", "No false positives", "%"], culling),
+        // All are of one test.
+        _ => (["six-plane", "Nothing missed", "ppm"], numbers),
+    };
+    let all = grouped(rows.iter().map(|row| (&row.names, *row)));
+    let head = all[0].1.iter().map(|row| swept(row.value));
+    let mut table = Table::of_numbers([header.to_owned()].into_iter().chain(head));
+    let is_sound = |row: &&SweepRow| row.error().is_some_and(|rate| rate.value == 0.0);
+    let all = all.into_iter();
+    let (sound, others): (Vec<_>, Vec<_>) = all.partition(|(_, own)| own.iter().all(is_sound));
+    for (names, own) in others {
+        let errors = own.iter().map(|row| match &row.refused {
+            Some(_) => "refused".to_owned(),
+            None => text::rate(row.error(), 1.0),
+        });
+        let label = name(names);
+        let short = label.strip_prefix("f32 ");
+        let short = short.filter(|_| names.planes != "frame");
+        let label = short.unwrap_or(&label).to_owned();
+        table.add_row([label].into_iter().chain(errors));
+    }
+    let uppers = sound.iter().flat_map(|(_, own)| own);
+    let bound = uppers.filter_map(|row| row.error()?.upper);
+    let bound = bound.fold(0.0, f64::max);
+    let sound: Vec<String> = sound.iter().map(|(names, _)| name(names)).collect();
+    let sound = some(sound.first(), |_| {
+        let (bound, sound) = (significant(bound), sound.join(", "));
+        format!("{nothing} (below {bound} {unit}): {sound}.")
+    });
+    (table, sound)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::precision::sweep;
+
+    #[test]
+    fn what_nothing_missed_means_is_the_largest_bound() {
+        let mut rows = sweep(Sweep::Offset, 1, 1);
+        let (first, last) = (rows[0].names, rows.last().expect("a row").names);
+        assert_ne!(first, last);
+        for (row, bound) in rows.iter_mut().zip([2.0, 1.0].into_iter().cycle()) {
+            let misses = u64::from(row.names == last);
+            row.errors = Some(crate::verify::ErrorCount {
+                false_negatives: misses,
+                ..Default::default()
+            });
+            row.false_negative_ppm = Some(crate::statistics::Estimate {
+                value: misses as f64,
+                lower: None,
+                upper: Some(bound + 9.0 * misses as f64),
+            });
+        }
+        let (_, told) = swept_errors(&rows.iter().collect::<Vec<_>>());
+        assert!(
+            told.starts_with("Nothing missed (below 2.00 ppm): "),
+            "{told}"
+        );
+    }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -78,73 +79,6 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// A worker that is given up after `patience` without a message.
-    ///
-    /// # Errors
-    /// The program cannot be started.
-    fn start(program: &Path, request: &Request, patience: Duration) -> anyhow::Result<Worker> {
-        let mut command = Command::new(program);
-        // Ctrl-C of a terminal goes to a whole group, and would end a worker that has no
-        // handler yet: its cells would have failed for good.
-        #[cfg(unix)]
-        {
-            use std::os::unix::process::CommandExt;
-            command.process_group(0).arg0(super::program::name());
-        }
-        let mut child = command
-            .arg("worker")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .with_context(|| program.display().to_string())?;
-        let (send, lines) = sync_channel(WAITING);
-        if let Some(out) = child.stdout.take() {
-            thread::spawn(move || {
-                let mut out = BufReader::new(out);
-                let mut most = LONGEST_FIRST;
-                loop {
-                    let mut line = Vec::new();
-                    // A line that is cut short is no message.
-                    let read = (&mut out).take(most).read_until(b'\n', &mut line);
-                    most = LONGEST;
-                    let ended = read.is_err();
-                    if matches!(read, Ok(0)) || send.send(read.map(|_| line)).is_err() || ended {
-                        break;
-                    }
-                }
-            });
-        }
-        let last_words = child.stderr.take().map(|mut err| {
-            thread::spawn(move || {
-                let (mut kept, mut some) = (Vec::new(), [0; 1024]);
-                while let Ok(n @ 1..) = err.read(&mut some) {
-                    kept.extend_from_slice(&some[..n]);
-                    let excess = kept.len().saturating_sub(LAST_WORDS);
-                    kept.drain(..excess);
-                }
-                kept
-            })
-        });
-        let mut stdin = child.stdin.take();
-        if let Some(stdin) = &mut stdin {
-            let mut line = serde_json::to_vec(request)?;
-            line.push(b'\n');
-            // A program that does not read it fails later.
-            let _ = stdin.write_all(&line);
-        }
-        Ok(Worker {
-            child,
-            _stdin: stdin,
-            lines,
-            last_words,
-            doing: (None, STARTING.to_owned()),
-            waited: Duration::ZERO,
-            looked: Instant::now(),
-            patience,
-        })
-    }
-
     /// Waits for the next message or the end, told, seen or made; none within `wait`.
     ///
     /// # Errors
@@ -155,7 +89,12 @@ impl Worker {
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
             Err(RecvTimeoutError::Timeout) if self.waited > self.patience => {
-                return Ok(Some(Err(self.give_up())));
+                // Its current step is what took too long.
+                self.kill();
+                let (structure, step) = self.doing.clone();
+                let reason = format!("{step} took longer than {} s", self.patience.as_secs());
+                let verdict = Verdict::new(Status::TimedOut, reason);
+                return Ok(Some(Err(Ended::Died(structure, verdict))));
             }
             Err(RecvTimeoutError::Timeout) => return Ok(None),
             Err(RecvTimeoutError::Disconnected) => return Ok(Some(Err(self.obituary()?))),
@@ -187,14 +126,6 @@ impl Worker {
             Message::Done => Err(Ended::Done),
             message => Ok(message),
         }))
-    }
-
-    /// Ends the process; its current step is what took too long.
-    fn give_up(&mut self) -> Ended {
-        self.kill();
-        let (structure, step) = &self.doing;
-        let reason = format!("{step} took longer than {} s", self.patience.as_secs());
-        Ended::Died(structure.clone(), Verdict::new(Status::TimedOut, reason))
     }
 
     fn kill(&mut self) {
@@ -314,7 +245,61 @@ impl Workers {
             cpu: self.cpus.get(cpu).copied(),
             layout,
         };
-        Worker::start(&self.program, &request, self.patience)
+        let mut command = Command::new(&self.program);
+        // Ctrl-C of a terminal goes to a whole group, and would end a worker that has no
+        // handler yet: its cells would have failed for good.
+        #[cfg(unix)]
+        {
+            use std::os::unix::process::CommandExt;
+            command.process_group(0).arg0(super::program::name());
+        }
+        let mut child = command
+            .arg("worker")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .with_context(|| self.program.display().to_string())?;
+        let (send, lines) = sync_channel(WAITING);
+        if let Some(out) = child.stdout.take() {
+            thread::spawn(move || {
+                let mut out = BufReader::new(out);
+                for most in iter::once(LONGEST_FIRST).chain(iter::repeat(LONGEST)) {
+                    let mut line = Vec::new();
+                    // A line that is cut short is no message.
+                    let read = (&mut out).take(most).read_until(b'\n', &mut line);
+                    let ended = read.is_err();
+                    if matches!(read, Ok(0)) || send.send(read.map(|_| line)).is_err() || ended {
+                        break;
+                    }
+                }
+            });
+        }
+        let last_words = child.stderr.take().map(|mut err| {
+            thread::spawn(move || {
+                let (mut kept, mut some) = (Vec::new(), [0; 1024]);
+                while let Ok(n @ 1..) = err.read(&mut some) {
+                    kept.extend_from_slice(&some[..n]);
+                    let excess = kept.len().saturating_sub(LAST_WORDS);
+                    kept.drain(..excess);
+                }
+                kept
+            })
+        });
+        let mut stdin = child.stdin.take();
+        let line = serde_json::to_string(&request)? + "\n";
+        // A program that does not read it fails later.
+        let _ = stdin.as_mut().map(|stdin| stdin.write_all(line.as_bytes()));
+        Ok(Worker {
+            child,
+            _stdin: stdin,
+            lines,
+            last_words,
+            doing: (None, STARTING.to_owned()),
+            waited: Duration::ZERO,
+            looked: Instant::now(),
+            patience: self.patience,
+        })
     }
 
     /// Runs a job in a separate process, on the next processor.
@@ -423,6 +408,16 @@ pub enum Job {
     },
     /// All that a study times.
     Times(Timing),
+}
+
+impl Job {
+    pub fn scene(scene: usize, share: Share, samples: bool) -> Job {
+        Job::Scene {
+            scene,
+            share,
+            samples,
+        }
+    }
 }
 
 /// Parameters of a process of a study.

@@ -1,21 +1,28 @@
 //! `cullbench query` and `cullbench locate`: one row per camera, point or box, and
-//! structure.
+//! structure. One structure answers after another: a large scene does not fit in memory
+//! several times.
 
+use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use serde_json::json;
+use serde::Serializer;
+use serde::ser::SerializeSeq;
+use serde_json::{Map, Value, json};
 
 use super::args::{LocateArgs, QueryArgs};
-use super::compare_structures::{Column, Row, ask_all, write};
-use super::{Ending, load_scene, tell};
+use super::shared_args::RowFormat;
+use super::{Ending, load_scene, tell, unread_is_fine};
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, Registry};
+use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::input::{is_readable, read_file, tell_warnings};
-use crate::measure::Workload;
+use crate::measure::{Answer, Workload, guarded, input_of};
 use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
-use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
+use crate::scene::{Scene, Sought, SoughtBox, available_bytes, read_sought_boxes_csv};
+use crate::shown::lines;
+use crate::threads::share;
 
 /// Points that are the camera places of the scene.
 const PLACES: &str = "places";
@@ -144,4 +151,324 @@ fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
 fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
     let boxes = read_sought_boxes_csv(&read_file(file)?[..], &file.display().to_string())?;
     Ok(boxes.into_iter().map(|b| scene.sought_box(b)).collect())
+}
+
+/// One structure's answer to one question.
+pub struct Row {
+    pub question: usize,
+    pub structure: String,
+    /// Items, ascending.
+    pub ids: Option<Box<[ItemId]>>,
+    pub answer: Answer,
+    /// Sum of the ids as files have them.
+    pub id_sum: u64,
+    pub cost: QueryCost,
+    /// An id of the answer that no item has.
+    stray: Option<ItemId>,
+}
+
+impl Row {
+    fn told(&self) -> String {
+        let ids = super::text::counted(self.answer.count as usize, "id");
+        format!("{} finds {ids} with sum {}", self.structure, self.id_sum)
+    }
+
+    fn bytes(&self) -> usize {
+        let ids = self.ids.as_deref().map_or(0, size_of_val);
+        size_of::<Row>() + self.structure.len() + ids
+    }
+}
+
+/// Bytes of answers in memory: enough that a structure is rarely built again.
+const HELD: usize = 64 << 20;
+
+/// Answers every question by every structure.
+///
+/// False if two structures disagree, or an id is no item's. Nothing is compared with the
+/// reference scan, which takes far longer.
+///
+/// `each` receives the answers in the order of questions, then of structures, in blocks of
+/// [`HELD`] bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
+/// line on standard error.
+pub fn ask_all(
+    structures: &[StructureSpec],
+    scene: &Scene,
+    boxes: &[Aabb],
+    (what, questions): (&str, usize),
+    keep_ids: bool,
+    ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync,
+    each: &mut dyn FnMut(Vec<Row>) -> io::Result<()>,
+) -> anyhow::Result<bool> {
+    let block = (HELD / size_of_val(boxes).max(1)).clamp(1, 1024);
+    let (mut from, mut agree) = (0, true);
+    let room = available_bytes().map_or(HELD, |free| HELD.min(free as usize / 8));
+    // A single structure is built once; of several there may be memory for one.
+    let mut only: Option<Box<dyn DynIndex>> = None;
+    while from < questions {
+        let mut answers: Vec<Vec<Row>> = Vec::new();
+        for spec in structures {
+            let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
+            let build = || spec.build(input_of(scene, boxes));
+            let index = match only.take().map_or_else(build, Ok) {
+                Ok(index) => index,
+                // One of many: the others' answers are worth having.
+                Err(error @ (BuildError::Refused { .. } | BuildError::OutOfMemory { .. }))
+                    if structures.len() > 1 =>
+                {
+                    if from == 0 {
+                        super::tell(&format!("left out: {error}"));
+                    }
+                    continue;
+                }
+                Err(error) => return Err(failed(error.to_string())),
+            };
+            // The first structure finds how many questions' answers there is room for.
+            let (mut held, first) = (0, answers.is_empty());
+            let end = [from + answers.len(), questions][usize::from(first)];
+            let mut next = from;
+            while next < end && (!first || held < room) {
+                let count = (end - next).min(block * spec.execution.threads.max(1));
+                if first {
+                    answers.extend((0..count).map(|_| Vec::with_capacity(structures.len())));
+                }
+                let asked = guarded(|| {
+                    let rows = answers[next - from..][..count].iter_mut().enumerate();
+                    share(spec.execution.threads, rows, |(n, row)| {
+                        let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+                        let question = next + n;
+                        ask(index.as_ref(), question, &mut out, &mut cost);
+                        if keep_ids {
+                            out.sort_unstable();
+                        }
+                        row.push(Row {
+                            question,
+                            structure: spec.label.clone(),
+                            answer: Answer::of(&out),
+                            id_sum: out.iter().map(|&id| u64::from(scene.row_of(id))).sum(),
+                            ids: keep_ids.then(|| out.as_slice().into()),
+                            cost,
+                            stray: out.iter().copied().find(|&id| id as usize >= boxes.len()),
+                        });
+                    });
+                });
+                asked.map_err(|verdict| failed(verdict.reason.unwrap_or_default()))?;
+                let rows = answers[next - from..].iter().filter_map(|row| row.last());
+                held += rows.map(Row::bytes).sum::<usize>() * structures.len();
+                next += count;
+            }
+            if structures.len() == 1 {
+                only = Some(index);
+            }
+        }
+        if answers.is_empty() {
+            break;
+        }
+        from += answers.len();
+        let rows: Vec<Row> = answers.into_iter().flatten().collect();
+        agree &= all_agree(&rows, what);
+        each(rows)?;
+    }
+    Ok(agree)
+}
+
+/// Reports ids that are no item's, and questions with different answers.
+///
+/// True if there is nothing to report.
+fn all_agree(rows: &[Row], what: &str) -> bool {
+    let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
+    let mut agree = true;
+    for row in rows {
+        let base = first.entry(row.question).or_insert(row);
+        if let Some(id) = row.stray {
+            agree = false;
+            let about = format!("{what} {}: {}", row.question, row.structure);
+            super::tell(&format!("error: {about} finds id {id}, which is no item's"));
+        }
+        if base.answer != row.answer {
+            agree = false;
+            let is_alike = (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum);
+            super::tell(&format!(
+                "error: {what} {}: {}, {}{}",
+                row.question,
+                base.told(),
+                row.told(),
+                ["", ", but other ids"][usize::from(is_alike)]
+            ));
+        }
+    }
+    agree
+}
+
+/// Head and cell of a column.
+pub type Column<'a, Row> = (&'a str, &'a dyn Fn(&Row) -> Value);
+
+/// Writes the answers that `ask` passes to its argument as CSV or JSON.
+/// A reader who leaves early changes neither questions nor answers.
+pub fn write(
+    format: RowFormat,
+    columns: &[Column<'_, Row>],
+    ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
+) -> anyhow::Result<bool> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    let agree = match format {
+        RowFormat::Csv => {
+            let mut csv = csv::Writer::from_writer(&mut out);
+            // Written with the first row: an error before it is all that is said.
+            let mut header = Some(columns.iter().map(|column| column.0));
+            let mut put = |rows: Vec<Row>| -> csv::Result<()> {
+                if let Some(columns) = header.take() {
+                    csv.write_record(columns)?;
+                }
+                let cells = |row| columns.iter().map(move |(_, value)| cell(&value(row)));
+                let mut rows = rows.iter().map(cells);
+                rows.try_for_each(|cells| csv.write_record(cells))
+            };
+            let agree = ask(&mut |rows| unread_is_fine(put(rows).map_err(io::Error::from)));
+            if agree.is_ok() {
+                unread_is_fine(put(Vec::new()).map_err(io::Error::from))?;
+            }
+            unread_is_fine(csv.flush())?;
+            agree
+        }
+        RowFormat::Json => {
+            let mut json = serde_json::Serializer::pretty(&mut out);
+            let mut array = json.serialize_seq(None).map_err(io::Error::from)?;
+            let object = |row: &Row| -> Map<String, Value> {
+                let field = |(name, value): &Column<'_, Row>| ((*name).to_owned(), value(row));
+                columns.iter().map(field).collect()
+            };
+            let agree = ask(&mut |rows| {
+                let mut rows = rows.iter().map(object);
+                let put = rows.try_for_each(|object| array.serialize_element(&object));
+                unread_is_fine(put.map_err(io::Error::from))
+            });
+            unread_is_fine(array.end().map_err(io::Error::from))?;
+            unread_is_fine(writeln!(out))?;
+            agree
+        }
+    };
+    match agree {
+        Ok(_) => unread_is_fine(out.flush())?,
+        // No answers but a beginning: it is not shown.
+        Err(_) => drop(out.into_parts()),
+    }
+    agree
+}
+
+/// A value as CSV holds it: ids separated by spaces, nothing for null.
+pub fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => lines(text),
+        Value::Array(ids) => ids.iter().map(cell).collect::<Vec<_>>().join(" "),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::{self, LinearScalar, RegionIndex};
+
+    const PANICS: index::Row = index::Row {
+        info: LinearScalar::INFO.named("panics"),
+        build: |_, _, _| panic!("deep in a peer's code"),
+        params: |_| Ok(Value::Null),
+    };
+    const REFUSES: index::Row = index::Row {
+        info: LinearScalar::INFO.named("refuses"),
+        build: |_, _, _| {
+            Err(BuildError::Refused {
+                structure: "refuses",
+                reason: "too many alike".to_owned(),
+            })
+        },
+        params: |_| Ok(Value::Null),
+    };
+
+    fn of(row: index::Row) -> StructureSpec {
+        StructureSpec {
+            label: row.info.name.to_owned(),
+            row,
+            params: Value::Null,
+            execution: Default::default(),
+            policy: Default::default(),
+        }
+    }
+
+    fn asked(structures: &[StructureSpec], panics: bool) -> Result<Vec<Row>, String> {
+        let scene = crate::scene::load("uniform:n=10", &Default::default()).expect("uniform");
+        let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
+            assert!(!panics, "deep in a peer's query");
+            out.push(7);
+        };
+        let mut all = Vec::new();
+        let mut each = |rows: Vec<Row>| {
+            all.extend(rows);
+            Ok(())
+        };
+        let what = ("camera", 2);
+        let items = &scene.items;
+        let agree = ask_all(structures, &scene, items, what, true, ask, &mut each);
+        agree.map(|_| all).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn answers_too_large_to_be_held_come_in_order_and_in_pieces() {
+        let scene = crate::scene::load("uniform:n=10k", &Default::default()).expect("uniform");
+        let two = [of(REFUSES), StructureSpec::parse("linear").expect("linear")];
+        // Of two thousand answers there is more than is held.
+        let many: Vec<ItemId> = (0..HELD as ItemId / 8000).collect();
+        for structures in [&two[1..], &two[..]] {
+            let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
+                out.extend(&many);
+            };
+            let mut seen = Vec::new();
+            let mut each = |rows: Vec<Row>| {
+                seen.push(rows.iter().map(|row| row.question).collect::<Vec<_>>());
+                Ok(())
+            };
+            let items = &scene.items;
+            let what = ("camera", 3000);
+            let agree = ask_all(structures, &scene, items, what, true, ask, &mut each);
+            assert!(agree.expect("linear answers"));
+            assert!(seen.len() > 1);
+            assert!(seen.concat().into_iter().eq(0..3000));
+        }
+    }
+
+    #[test]
+    fn other_ids_of_the_same_sum_are_noticed() {
+        let row = |ids: &[ItemId]| Row {
+            question: 0,
+            structure: "any".to_owned(),
+            ids: None,
+            answer: Answer::of(ids),
+            id_sum: ids.iter().map(|&id| u64::from(id)).sum(),
+            cost: QueryCost::default(),
+            stray: None,
+        };
+        assert!(all_agree(&[row(&[1, 4]), row(&[4, 1])], "camera"));
+        assert!(!all_agree(&[row(&[1, 4]), row(&[2, 3])], "camera"));
+        let stray = Row {
+            stray: Some(4),
+            ..row(&[1, 4])
+        };
+        assert!(!all_agree(&[stray], "camera"));
+    }
+
+    #[test]
+    fn a_panic_is_one_line_and_a_refusal_leaves_the_others() {
+        let linear = StructureSpec::parse("linear").expect("linear");
+        let error = asked(&[linear.clone(), of(PANICS)], false).err();
+        let wanted = "structure 'panics': panicked: deep in a peer's code";
+        assert_eq!(error.as_deref(), Some(wanted));
+        let error = asked(std::slice::from_ref(&linear), true).err();
+        let wanted = "structure 'linear': panicked: deep in a peer's query";
+        assert_eq!(error.as_deref(), Some(wanted));
+        let answers = asked(&[of(REFUSES), linear], false).expect("linear answers");
+        assert!(answers.len() == 2 && answers.iter().all(|a| a.structure == "linear"));
+        let error = asked(&[of(REFUSES)], false).err().unwrap_or_default();
+        assert!(error.contains("too many alike"), "{error}");
+    }
 }

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 
 use super::args::RunArgs;
 use super::document::show;
-use super::interrupt::Interrupted;
+use super::interrupt::{self, Interrupted};
 use super::processes::{Ended, Job, Message, Workers};
 use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
@@ -172,7 +172,10 @@ impl<'a> Run<'a> {
     fn scene(&mut self, scene: usize) -> Result<()> {
         let planned = self.plan.scenes[scene].clone();
         let keys = self.plan.keys_of(&planned);
-        let mut failed = self.failed_before(&planned.source);
+        // Structures that have ended a process on this scene, if the run was begun before.
+        let before = self.stream.parts.iter().map(|kept| &kept.part);
+        let before = before.filter(|part| part.key.scene == planned.source);
+        let mut failed: BTreeMap<_, _> = before.flat_map(|part| part.failed.clone()).collect();
         for process in 0..self.plan.effort.processes {
             loop {
                 interrupt::check()?;
@@ -197,14 +200,6 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Structures that have ended a process on this scene, if the run was begun
-    /// before.
-    fn failed_before(&self, scene: &str) -> BTreeMap<String, Verdict> {
-        let parts = self.stream.parts.iter().map(|kept| &kept.part);
-        let of_scene = parts.filter(|part| part.key.scene == scene);
-        of_scene.flat_map(|part| part.failed.clone()).collect()
-    }
-
     fn share(&self, keys: &[GroupKey], process: u32, failed: &BTreeMap<String, Verdict>) -> Share {
         let known = |key: &GroupKey| {
             let first = self.stream.of_group(key);
@@ -223,11 +218,7 @@ impl<'a> Run<'a> {
 
     fn worker(&mut self, scene: usize, share: Share) -> Result<Ended> {
         let process = share.process;
-        let job = Job::Scene {
-            scene,
-            share,
-            samples: true,
-        };
+        let job = Job::scene(scene, share, true);
         let source = self.plan.scenes[scene].source.clone();
         let processes = self.plan.effort.processes;
         let mut keep = |said| {
@@ -258,9 +249,8 @@ impl<'a> Run<'a> {
         let later = process..self.plan.effort.processes;
         let missed = keys.iter().filter(|key| !self.stream.has(key, process));
         let missed = missed.flat_map(|key| later.clone().map(move |process| (key, process)));
-        let missed: Vec<_> = missed
-            .filter(|(key, p)| !self.stream.has(key, *p))
-            .collect();
+        let missed = missed.filter(|(key, process)| !self.stream.has(key, *process));
+        let missed: Vec<_> = missed.collect();
         for (key, process) in missed {
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);

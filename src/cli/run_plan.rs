@@ -84,7 +84,13 @@ pub fn plan_of(
     for scene in &plan.scenes {
         each_once("path", &scene.paths)?;
     }
-    check_motions(&plan, &suite.name)?;
+    each_once("motion", &plan.motions)?;
+    if !plan.motions.is_empty() && plan.scenes.iter().any(|scene| scene.cold) {
+        let suite = suite.name;
+        bail!(
+            "suite '{suite}' has cold caches, --motion has none; expected another suite, or --scene"
+        );
+    }
     let is_suite = args.scene.is_empty() && args.path.is_empty();
     Ok(RunPlan {
         plan,
@@ -112,18 +118,6 @@ pub fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -
         ensure!(
             seen.insert(name.to_owned()),
             "{what} '{name}' is named twice; expected each once"
-        );
-    }
-    Ok(())
-}
-
-/// Motions are named once and measured with warm caches.
-fn check_motions(plan: &Plan, suite: &str) -> Result<()> {
-    each_once("motion", &plan.motions)?;
-    let mut scenes = plan.scenes.iter();
-    if !plan.motions.is_empty() && scenes.any(|scene| scene.cold) {
-        bail!(
-            "suite '{suite}' has cold caches, --motion has none; expected another suite, or --scene"
         );
     }
     Ok(())

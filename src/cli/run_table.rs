@@ -5,12 +5,12 @@
 
 use std::collections::BTreeSet;
 
-use super::document::Block;
-use super::table::Table;
+use super::document::{Block, Table};
 use super::{run_verdict, scene_facts, text};
-use crate::measure::{GroupKey, Status};
+use crate::culling::{Culling, CullingTest};
+use crate::measure::{CellKey, GroupKey, Status};
 use crate::report::{Comparison, Overall, ReportCell, grouped, times_as_fast};
-use crate::shown::{shortened, without_middle};
+use crate::shown::{plain, shortened, without_middle};
 use crate::spec::parse_number;
 use crate::statistics::Estimate;
 
@@ -82,13 +82,17 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
             Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
         }
     });
-    let sources = text::by_source(comparison);
-    let sources = sources.map(|items| format!("{items} by storage/planes/test"));
-    let excess = match text::false_positives(comparison) {
+    // Nothing if all are the culling test's own.
+    let errors = comparison.judged().map(|judged| judged.errors);
+    let errors = errors.filter(|errors| errors.by_storage > 0 || errors.by_planes > 0);
+    let sources = errors.map(|errors| text::sources(errors) + " by storage/planes/test");
+    let excess = comparison.metric_of_any("excess");
+    let excess = match excess.map(|excess| excess.estimate().per(0.01)) {
         None => sources.map(|items| format!("false positives {items}")),
         Some(share) => {
             let sources = text::some(sources, |items| format!(" ({items})"));
-            Some(format!("{share} false positives{sources}"))
+            let share = text::rate(Some(share), 1.0);
+            Some(format!("{share} % false positives{sources}"))
         }
     };
     let asked = text::joined([&views, &cell.test, cache.unwrap_or_default()]);
@@ -342,4 +346,52 @@ fn notes(group: &[&Comparison], of: impl Fn(&ReportCell) -> Option<String>) -> V
         text::plain(&line) + &count
     });
     lines.collect()
+}
+
+/// A cell by its name in a sentence.
+pub fn name(cell: &CellKey) -> String {
+    let (structure, scene) = (&cell.structure, &cell.group.scene);
+    format!("{structure} on {scene}, {}", question(&cell.group))
+}
+
+/// Structure in at most twenty characters; its last parameter stays.
+pub fn short_structure(name: &str) -> String {
+    without_middle(&plain(name), [8, 9])
+}
+
+/// Scene and path in short, with the test and the cache state that are no defaults.
+///
+/// At most `room` characters; the scene is cut first.
+pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String {
+    let other = |text: &String, usual: &str| (text != usual).then(|| text.clone());
+    let test = other(&group.test, CullingTest::SixPlane.name());
+    let cache = other(&group.cache, "warm");
+    let motion = other(&group.motion, "").map(|motion| short(&motion));
+    let parts = [Some(short(&group.path)), test, cache, motion];
+    let parts = parts.into_iter().flatten().chain(unusual(group));
+    let rest: String = parts.map(|part| format!(" {part}")).collect();
+    let scene = short(&group.scene);
+    if text::across(&scene) + text::across(&rest) <= room {
+        return scene + &rest;
+    }
+    let most = room.saturating_sub(3);
+    let left = most.saturating_sub(text::across(&rest) + 3).max(8);
+    shortened(&(shortened(&scene, left) + &rest), most)
+}
+
+/// All of a key that is no default, but for the scene.
+pub fn question(group: &GroupKey) -> String {
+    let cold = Some(&group.cache).filter(|cache| *cache != "warm");
+    let test = group.test.clone() + &text::some(cold, |cache| format!(" ({cache})"));
+    let asked = [group.path.clone(), test, group.motion.clone()];
+    text::joined(asked.into_iter().chain(unusual(group)))
+}
+
+/// Arithmetic, plane derivation and epsilon, where they are no defaults.
+fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
+    let usual = GroupKey::of("", "", false, &Culling::default(), "");
+    let epsilon = |key: &GroupKey| format!("epsilon {}", key.epsilon);
+    let facts = |key: &GroupKey| [key.arithmetic.clone(), key.planes.clone(), epsilon(key)];
+    let both = facts(group).into_iter().zip(facts(&usual));
+    both.filter(|(own, usual)| own != usual).map(|(own, _)| own)
 }

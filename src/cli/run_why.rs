@@ -1,9 +1,8 @@
 //! `run --why STRUCTURE`: tests and time per test beside the best structure's.
 
-use super::document::Block;
+use super::document::{Block, Table};
 use super::run_table::{distinct, groups, labels, settings};
 use super::run_verdict::times;
-use super::table::Table;
 use super::text::{self, some};
 use crate::report::{Comparison, Report, ReportCell, comparisons};
 use crate::shown::shortened;

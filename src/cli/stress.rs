@@ -10,8 +10,8 @@ use anyhow::bail;
 use indicatif::ProgressBar;
 
 use super::args::StressArgs;
+use super::document::{Column, Table};
 use super::shared_args::first_seed;
-use super::table::{Column, Table};
 use super::{Ending, interrupt, print, text};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;

@@ -3,9 +3,8 @@
 //! `report`; read off a report, nothing is measured.
 
 use super::diagram::{Diagram, Joined, Point, Series};
-use super::document::Block;
+use super::document::{Block, Column, Table};
 use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
-use super::table::{Column, Table};
 use super::{run_figures, text};
 use crate::measure::YARDSTICK;
 use crate::report::{
@@ -80,14 +79,9 @@ pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
     let is_shown = |surface: &&Surface| surface.spans() && surface.sizes().len() >= sizes;
     for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
         blocks.push(Block::heading(format!("Crossover: {}", title(surface))));
-        let speedups = match surface
-            .places
-            .iter()
-            .any(|place| place.cell(YARDSTICK).is_some())
-        {
-            true => " and its speed-up vs linear; none if a scan wins",
-            false => "",
-        };
+        let mut yardsticks = surface.places.iter().filter_map(|p| p.cell(YARDSTICK));
+        let speedup = |_| " and its speed-up vs linear; none if a scan wins";
+        let speedups = yardsticks.next().map_or("", speedup);
         blocks.push(Block::Line(format!(
             "The fastest structure (= those not told from it){speedups}. Shares are rounded on \
              a log scale to 1, 1.5, 2, 3, 5, 7, 10, ... percent; (at ...) gives a share that is \

@@ -5,14 +5,20 @@ use std::iter;
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
+
 pub use crate::shown::{count, counted, first_of, lines, message, plain, significant, time, unit};
 use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
 
 /// "698 items, 2 bad items left out".
 pub fn items(count: usize, left_out: usize) -> String {
-    let bad = (left_out > 0).then(|| counted(left_out, "bad item") + " left out");
-    joined([counted(count, "item"), bad.unwrap_or_default()])
+    let bad = any(left_out, "bad item", |bad| format!("{bad} left out"));
+    joined([counted(count, "item"), bad])
+}
+
+/// Text on things that are counted; nothing if there are none.
+pub fn any(count: usize, thing: &str, show: impl FnOnce(String) -> String) -> String {
+    some((count > 0).then(|| counted(count, thing)), show)
 }
 
 /// A figure as text; nothing if there is none.
@@ -89,11 +95,6 @@ fn basis_of_times(report: &Report) -> String {
     format!("95 % intervals over {over}{few}{check}")
 }
 
-/// One digit behind the point.
-pub fn tenths(value: f64) -> String {
-    format!("{value:.1}")
-}
-
 /// Three significant digits without zeros at the end: 12.5, 9, 0.05.
 pub fn short(value: f64) -> String {
     let text = significant(value);
@@ -158,25 +159,22 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     }
 }
 
-/// " ± 11 %" where the interval is nearly symmetric in the logarithm.
+/// A time with its uncertainty: "3.64 us ± 11 %".
 ///
-/// Elsewhere the interval in a unit; nothing if an end is not known.
-pub fn uncertainty(metric: &Metric, unit: f64) -> String {
+/// A share where the interval is nearly symmetric in the logarithm, elsewhere its ends;
+/// nothing if one is not known.
+pub fn time_with(metric: &Metric) -> String {
     let ends = metric.estimate().ends();
     let logs = ends.map(|[lower, upper]| [metric.value / lower, upper / metric.value].map(f64::ln));
-    match logs {
+    let uncertainty = match logs {
         Some([below, above]) if (below - above).abs() <= 0.2 * above && above < 0.5 => {
             let percent = below.max(above).exp_m1() * 100.0;
             let digits = usize::from(percent < 1.0);
             format!(" ± {percent:.digits$} %")
         }
-        _ => interval(ends, unit),
-    }
-}
-
-/// A time with its uncertainty: "3.64 us ± 11 %".
-pub fn time_with(metric: &Metric) -> String {
-    time(metric.value) + &uncertainty(metric, unit(metric.value).0)
+        _ => interval(ends, unit(metric.value).0),
+    };
+    time(metric.value) + &uncertainty
 }
 
 /// A rate per `units` with its 95 % interval; nothing if there is none.
@@ -216,13 +214,14 @@ pub fn wrapped(text: &str, width: usize) -> String {
 }
 
 /// A name and a text per row, the text wrapped into a column of its own.
-pub fn entries(rows: &[[String; 2]], width: usize) -> String {
-    let names = rows.iter().map(|[name, _]| name.chars().count());
+pub fn entries<T: AsRef<str>>(rows: impl IntoIterator<Item = [T; 2]>, width: usize) -> String {
+    let rows: Vec<[T; 2]> = rows.into_iter().collect();
+    let names = rows.iter().map(|[name, _]| name.as_ref().chars().count());
     let names = names.max().unwrap_or(0);
     let mut all = String::new();
-    for [name, text] in rows {
-        let text = wrapped(text, width.saturating_sub(names + 4));
-        let before = iter::once(name.as_str()).chain(iter::repeat(""));
+    for [name, text] in &rows {
+        let text = wrapped(text.as_ref(), width.saturating_sub(names + 4));
+        let before = iter::once(name.as_ref()).chain(iter::repeat(""));
         for (line, name) in text.lines().zip(before) {
             all += format!("  {name:<names$}  {line}").trim_end();
             all.push('\n');
@@ -268,20 +267,6 @@ pub fn basis(comparison: &Comparison) -> String {
         of(|cell| cell.times.cameras_checked, &count),
         count(comparison.of_any("judged_queries").unwrap_or(0.0) as usize)
     )
-}
-
-/// False positives of the truly visible items: "0.08±0.03 %".
-pub fn false_positives(comparison: &Comparison) -> Option<String> {
-    let share = comparison.metric_of_any("excess")?.estimate().per(0.01);
-    Some(format!("{} %", with_ends(share)))
-}
-
-/// Sources of false positives, as items of all judged cameras: "12/0/80". Nothing
-/// if all are the culling test's own.
-pub fn by_source(comparison: &Comparison) -> Option<String> {
-    let errors = &comparison.judged()?.errors;
-    let others = errors.by_storage > 0 || errors.by_planes > 0;
-    others.then(|| sources(*errors))
 }
 
 /// False positives by storage, planes and test: "12/0/80".
@@ -335,9 +320,10 @@ pub fn print(parts: &[String]) -> io::Result<()> {
     let text = lines(&parts.join("\n")) + "\n";
     io::stdout().lock().write_all(text.as_bytes())
 }
+
 #[cfg(test)]
 mod tests {
-    use super::super::table::Table;
+    use super::super::document::Table;
     use super::*;
 
     #[test]
@@ -457,7 +443,7 @@ mod tests {
         assert_eq!(wrapped("  four words", 8), "  four\n  words");
         let rows = [["a", "one two three\n4"], ["name", "5"]];
         assert_eq!(
-            entries(&rows.map(|row| row.map(str::to_owned)), 16),
+            entries(rows, 16),
             "  a     one two\n        three\n        4\n  name  5\n"
         );
     }

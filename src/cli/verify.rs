@@ -2,16 +2,18 @@
 //! reference scan, then random differential cases. Prints the first
 //! difference of each kind with what is needed to see it again.
 
+use std::io;
 use std::time::Instant;
 
 use anyhow::bail;
 use glam::Vec3;
 use indicatif::ProgressBar;
+use serde::Serialize;
 
 use super::args::VerifyArgs;
+use super::document::{Column, Table};
 use super::run_resume::{TypedOptions, command_line};
 use super::shared_args::first_seed;
-use super::verify_table::{Check, Outcome, RANDOM, show};
 use super::{Ending, interrupt, load_scene, print, program, text};
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
@@ -19,7 +21,9 @@ use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::{ItemId, Located};
+use crate::report::grouped;
 use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
+use crate::shown::shortened;
 use crate::verify::{
     ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
     points_on_faces, scan, variants,
@@ -126,8 +130,13 @@ fn check_path(
             rows = checked;
             continue;
         }
+        // The first difference stays.
         for (row, more) in rows.iter_mut().zip(checked) {
-            row.add(more);
+            row.volumes += more.volumes;
+            row.verdicts += more.verdicts;
+            if row.is_answered() {
+                (row.status, row.difference) = (more.status, more.difference);
+            }
         }
     }
     Ok(rows)
@@ -252,18 +261,8 @@ impl Check {
         }
     }
 
-    /// Takes in another kind of volume; the first difference stays.
-    fn add(&mut self, more: Check) {
-        self.volumes += more.volumes;
-        self.verdicts += more.verdicts;
-        if self.is_answered() {
-            self.status = more.status;
-            self.difference = more.difference;
-        }
-    }
-
     /// False where an answer is wrong or not there.
-    pub fn is_answered(&self) -> bool {
+    fn is_answered(&self) -> bool {
         self.status == Status::Ok.name()
     }
 }
@@ -372,3 +371,107 @@ fn differ(
 
 #[cfg(test)]
 mod tests;
+
+/// Scene of the random cases.
+const RANDOM: &str = "random";
+
+/// One structure on one scene and path (or on all random cases).
+#[derive(Serialize)]
+pub struct Check {
+    scene: String,
+    path: String,
+    structure: String,
+    volumes: usize,
+    verdicts: u64,
+    status: &'static str,
+    /// The first difference and the command that shows it again.
+    pub difference: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Outcome {
+    ok: bool,
+    verdicts: u64,
+    /// Bad items that were left out of the scenes.
+    skipped_items: usize,
+    /// Checks with a difference, however many verdicts are wrong in each.
+    mismatches: usize,
+    /// True if answers were compared with the cameras as written too.
+    against_cameras: bool,
+    seconds: f64,
+    seed: u64,
+    cases: u64,
+    checks: Vec<Check>,
+}
+
+fn show(outcome: &Outcome) -> io::Result<()> {
+    let width = text::width();
+    let all = outcome.checks.iter();
+    let all = grouped(all.map(|check| (check.structure.as_str(), check)));
+    let columns: &[Column<&Vec<&Check>>] = &[
+        ("structure", |own| shortened(&own[0].structure, 30)),
+        (">paths", |own| {
+            let of_paths = own.iter().filter(|check| check.scene != RANDOM);
+            text::count(of_paths.count())
+        }),
+        (">volumes", |own| {
+            text::count(own.iter().map(|check| check.volumes).sum())
+        }),
+        (">verdicts", |own| {
+            let verdicts = own.iter().map(|check| check.verdicts).sum::<u64>();
+            text::count(verdicts as usize)
+        }),
+        ("status", |own| {
+            let mut statuses: Vec<&str> = own.iter().map(|check| check.status).collect();
+            statuses.sort_unstable();
+            statuses.dedup();
+            statuses.join(", ")
+        }),
+    ];
+    let table = Table::with(all.iter().map(|(_, own)| own), columns);
+    let mut told = vec![table.fitted(width)];
+    for check in &outcome.checks {
+        if let Some(difference) = &check.difference {
+            let (structure, scene, path) = (&check.structure, &check.scene, &check.path);
+            let about = text::plain(&format!("{structure} on {scene}, {path}"));
+            told.push(format!("{about}:\n  {difference}"));
+        }
+    }
+    let own = all.iter().map(|(_, own)| own);
+    let differ = own.filter(|own| own.iter().any(|check| check.difference.is_some()));
+    let is_silent = |check: &&Check| check.difference.is_none() && !check.is_answered();
+    let silent = all.iter().filter(|(_, own)| own.iter().any(is_silent));
+    let (of, checks) = (text::counted(all.len(), "structure"), outcome.checks.len());
+    let reference = "the reference scan";
+    let checked = format!(
+        "{}: {} in {:.1} s ({:.1} million/s), {}",
+        match (differ.count(), silent.count(), &all[..]) {
+            (0, 0, []) => "Nothing was checked".to_owned(),
+            (0, 0, [(one, _)]) => format!("{one} returns the sets of {reference}"),
+            (0, 0, _) => format!("All {of} return the sets of {reference}"),
+            (0, silent, _) if silent == all.len() =>
+                "No structure answered (see status)".to_owned(),
+            (0, silent, _) => format!(
+                "{silent} of {of} did not answer (see status), the others return the sets of \
+                 {reference}"
+            ),
+            (1, ..) => format!("1 of {of} differs from {reference} or misses what the cameras see"),
+            (wrong, ..) =>
+                format!("{wrong} of {of} differ from {reference} or miss what the cameras see"),
+        },
+        text::counted(outcome.verdicts as usize, "verdict"),
+        outcome.seconds,
+        outcome.verdicts as f64 / outcome.seconds / 1e6,
+        match outcome.mismatches {
+            0 => "no mismatches".to_owned(),
+            failed => format!("{failed} of {checks} checks failed (structure x path)"),
+        }
+    );
+    told.push(text::wrapped(&checked, width));
+    if !outcome.against_cameras {
+        let doubt = "Planes without the full margin may drop visible items: a few cameras were \
+                     checked, points on their faces were not.";
+        told.push(text::wrapped(doubt, width));
+    }
+    text::print(&told)
+}

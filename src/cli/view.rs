@@ -10,13 +10,12 @@ use obvhs::ploc::morton::morton_encode_u64;
 use serde::Serialize;
 
 use super::command_args::ViewArgs;
-use super::compare_structures::{Row, ask_all};
 use super::document::page;
-use super::query::frustum;
+use super::query::{Row, ask_all, frustum};
 use super::study::progress;
-use super::text::html;
+use super::text::{self, html};
 use super::{
-    Ending, expect_places, load_scene, program, scene_facts, tell, text, unread_is_fine, write_text,
+    Ending, expect_places, load_scene, program, scene_facts, tell, unread_is_fine, write_text,
 };
 use crate::camera::{Camera, ClipSpace};
 use crate::funnel::{RaysEnd, Shape};
@@ -35,8 +34,8 @@ use crate::visibility::Rays;
 const MOST_ITEMS: usize = 2_000_000;
 
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
-    let out = [("--out", &Some(args.out.clone()))];
-    expect_places(&out, &[&args.scene, &args.path])?;
+    let out = Some(args.out.clone());
+    expect_places(&[("--out", &out)], &[&args.scene, &args.path])?;
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
@@ -72,7 +71,12 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let questions = ("camera", views);
     let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
     let costs = grouped(costs.into_iter()).into_iter();
-    data.structures = costs.map(Counters::of).collect();
+    let counters = |(name, costs): (String, Vec<QueryCost>)| Counters {
+        name,
+        nodes_tested: costs.iter().map(|cost| cost.nodes_tested).collect(),
+        items_tested: costs.iter().map(|cost| cost.items_tested).collect(),
+    };
+    data.structures = costs.map(counters).collect();
     let threads = args.culling.kernel.execution()?.threads;
     let samples = args.samples;
     let surfaces = samples.map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
@@ -357,17 +361,6 @@ impl ViewData {
         };
         let order = order.into_iter().map(|(_, item)| item as ItemId);
         (data, order.collect())
-    }
-}
-
-impl Counters {
-    /// Tests by a structure of its name and its costs, view by view.
-    fn of((name, costs): (String, Vec<QueryCost>)) -> Counters {
-        Counters {
-            name,
-            nodes_tested: costs.iter().map(|cost| cost.nodes_tested).collect(),
-            items_tested: costs.iter().map(|cost| cost.items_tested).collect(),
-        }
     }
 }
 

@@ -15,10 +15,10 @@ use rand_pcg::Pcg64;
 
 use super::Ending;
 use super::args::{Cli, Command};
-use super::processes::{Job, Message, PROTOCOL, Request, Timing};
+use super::processes::{Job, Message, PROTOCOL, Request};
 use super::{advise, drift, funnel, precision, run_plan};
 use crate::index::{Registry, StructureSpec};
-use crate::measure::{Part, Plan, ProcessTimes, Share, TIMING, TaskSamples, measure_scene};
+use crate::measure::{Part, Plan, Share, TIMING, TaskSamples, measure_scene};
 
 /// Error of a request whose job and arguments do not match.
 const OTHER: &str = "a job of another command";
@@ -77,21 +77,16 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             stay_on(request.cpu);
             at.set(None, TIMING);
             tell(&at.message());
-            tell(&Message::Times(times(registry, &command, &timing)?));
+            tell(&Message::Times(match command {
+                Command::Advise(args) => advise::time(registry, &args, &timing)?,
+                Command::Precision(args) => precision::time(registry, &args, &timing)?,
+                Command::Funnel(args) => funnel::time(registry, &args, &timing)?,
+                Command::Drift(args) => drift::time(&args, &timing)?,
+                _ => bail!(OTHER),
+            }));
         }
     }
     Ok(())
-}
-
-/// Times of one process of a study.
-fn times(registry: &Registry, command: &Command, timing: &Timing) -> anyhow::Result<ProcessTimes> {
-    match command {
-        Command::Advise(args) => advise::time(registry, args, timing),
-        Command::Precision(args) => precision::time(registry, args, timing),
-        Command::Funnel(args) => funnel::time(registry, args, timing),
-        Command::Drift(args) => drift::time(args, timing),
-        _ => bail!(OTHER),
-    }
 }
 
 /// Current step of the process.
@@ -175,10 +170,9 @@ fn end_with_the_parent() {
 }
 
 fn send(message: &Message) -> io::Result<()> {
-    let mut text = serde_json::to_vec(message)?;
-    text.push(b'\n');
+    let text = serde_json::to_string(message)? + "\n";
     let mut out = io::stdout().lock();
-    out.write_all(&text)?;
+    out.write_all(text.as_bytes())?;
     out.flush()
 }
 
