@@ -189,12 +189,6 @@ impl Beside {
     }
 }
 
-/// Mean share of the items that a query returns.
-fn share_in_view(known: &Known, items: usize) -> f64 {
-    let counts = known.visible.iter().map(|answer| answer.count as f64);
-    counts.sum::<f64>() / (known.visible.len() * items).max(1) as f64
-}
-
 /// The first of the points at which another structure is faster than the one taken.
 fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
     (1..points.len()).find_map(|n| {
@@ -269,7 +263,11 @@ impl Changed {
         let moved = workload.motion.as_ref().map(Motion::share);
         let reached = match self.axis {
             Some(Axis::Items) => Some(items as f64),
-            Some(Axis::ShareInView) => part.known.as_ref().map(|known| share_in_view(known, items)),
+            // Mean share of the items that a query returns.
+            Some(Axis::ShareInView) => part.known.as_ref().map(|known| {
+                let counts = known.visible.iter().map(|answer| answer.count as f64);
+                counts.sum::<f64>() / (known.visible.len() * items).max(1) as f64
+            }),
             _ => moved,
         };
         Some((reached.unwrap_or(self.value), part))

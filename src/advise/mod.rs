@@ -190,7 +190,11 @@ impl Prepared {
             funnel: &funnel,
         };
         let rules = self.entered.rules.into_iter();
-        let settled = rules.map(|(rule, draft)| rule.settled(draft, answered, &times, &facts));
+        let settled = rules.map(|(rule, draft)| {
+            let check = draft.sides.map(|sides| sides.check(answered, &times));
+            let finding = (draft.conclude)(&facts, check.as_ref());
+            rule.omission(finding, check)
+        });
         Advice {
             draw_ns: input.draw_ns,
             processes: processes.len(),

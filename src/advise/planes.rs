@@ -247,7 +247,7 @@ pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rule::tests::some_rule;
+    use super::super::rule::some_rule;
     use super::super::trials::{By, Decision};
     use super::*;
     use crate::geometry::Plane;

@@ -5,9 +5,8 @@ use serde::Serialize;
 
 use super::change::Change;
 use super::choice::{MotionChoice, StructureChoice, TestChoice};
-use super::trials::{Answered, By, Check, Decision, Sides, Trials, is_longer, of_costs};
+use super::trials::{By, Check, Decision, Sides, Trials, is_longer, of_costs};
 use crate::funnel::FunnelReport;
-use crate::measure::OverProcesses;
 
 /// A row of the table of rules.
 #[derive(Debug, Serialize)]
@@ -80,8 +79,8 @@ type Conclude = dyn FnOnce(&Facts, Option<&Check>) -> Finding;
 
 /// A rule with its tasks entered, before its times.
 pub struct Draft {
-    sides: Option<Sides>,
-    conclude: Box<Conclude>,
+    pub sides: Option<Sides>,
+    pub conclude: Box<Conclude>,
 }
 
 impl Draft {
@@ -103,19 +102,6 @@ impl Draft {
 }
 
 impl Rule {
-    /// The omission that follows from the facts and the times.
-    pub fn settled(
-        &'static self,
-        draft: Draft,
-        answered: &Answered,
-        times: &OverProcesses,
-        facts: &Facts,
-    ) -> Omission {
-        let check = draft.sides.map(|sides| sides.check(answered, times));
-        let finding = (draft.conclude)(facts, check.as_ref());
-        self.omission(finding, check)
-    }
-
     /// Weighs statistic, clock and answers; a side that misses more is never taken.
     pub fn omission(&'static self, finding: Finding, check: Option<Check>) -> Omission {
         let check = check.or(finding.check);
@@ -145,8 +131,10 @@ impl Rule {
         let by_clock = by_clock.and_then(|check| is_longer(check.ratio?));
         let misses_more = |c: &Check| c.left_out.false_negative_ppm > c.kept.false_negative_ppm;
         let is_lost = check.is_some_and(misses_more) || omission.is_wrong();
-        if let Some(predicted) = omission.predicted() {
-            let leaves_out = finding.leaves_out.or(by_clock).unwrap_or(predicted);
+        let compared = finding.compared;
+        let order = compared.and_then(|[own, most]| own.partial_cmp(&most));
+        if let Some(order) = order {
+            let leaves_out = finding.leaves_out.or(by_clock).unwrap_or(order.is_le());
             let is_left_out = leaves_out && !is_lost;
             omission.decision = [Decision::Keep, Decision::LeaveOut][usize::from(is_left_out)];
             if is_lost {
@@ -188,12 +176,6 @@ impl Omission {
         (self.decision != Decision::NotApplicable).then_some(self.decision == Decision::Keep)
     }
 
-    /// Returns `true` if statistic and threshold leave out.
-    fn predicted(&self) -> Option<bool> {
-        let order = self.statistic?.partial_cmp(&self.threshold?)?;
-        Some(order.is_le())
-    }
-
     /// Returns `true` if two sides that must answer the same did not.
     pub fn is_wrong(&self) -> bool {
         let check = self.check.as_ref().filter(|_| self.rule.by == By::Time);
@@ -202,7 +184,10 @@ impl Omission {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub use tests::some_rule;
+
+#[cfg(test)]
+mod tests {
     use super::*;
 
     /// A rule that enters nothing.

@@ -288,8 +288,7 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rule::Omission;
-    use super::super::rule::tests::some_rule;
+    use super::super::rule::{Omission, some_rule};
     use super::super::trials::{By, Decision};
     use super::*;
     use crate::statistics::Estimate;

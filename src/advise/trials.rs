@@ -1,7 +1,8 @@
 //! Tasks of the rules and of the choice of a test.
 //!
 //! Every process enters them in the same order; one runs and compares them; all time them
-//! side by side.
+//! side by side. A check has both sides as measured, and a tie shows in the interval of
+//! their ratio.
 
 use std::ops::Deref;
 
@@ -70,12 +71,8 @@ impl<'c> Trials<'c> {
     /// Runs every task for every camera, and compares with the truth.
     pub fn answered(&self) -> Answered {
         let truths = self.case.truths();
-        let mut answered = Answered {
-            answers: Vec::with_capacity(self.asks.len()),
-            errors: Vec::with_capacity(self.asks.len()),
-        };
         let mut out: Vec<ItemId> = Vec::new();
-        for (ask, is_judged) in &self.asks {
+        let answered = self.asks.iter().map(|(ask, is_judged)| {
             let mut errors = is_judged.then(Vec::new);
             let mut truths = truths.iter().peekable();
             let answers = (0..self.case.cameras()).map(|camera| {
@@ -87,10 +84,11 @@ impl<'c> Trials<'c> {
                 }
                 Answer::of(&out)
             });
-            answered.answers.push(answers.collect());
-            answered.errors.push(errors);
-        }
-        answered
+            let answers: Vec<Answer> = answers.collect();
+            (answers, errors)
+        });
+        let (answers, errors) = answered.unzip();
+        Answered { answers, errors }
     }
 
     /// All tasks, to be timed.
@@ -169,12 +167,9 @@ pub(super) const TIE: f64 = 1.05;
 ///
 /// `None` for a tie. Without an interval the value decides.
 pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
-    match (ratio.lower, ratio.upper) {
-        (Some(lower), Some(upper)) => {
-            (lower > TIE || upper < 1.0 / TIE).then_some(ratio.value > 1.0)
-        }
-        _ => Some(ratio.value > 1.0),
-    }
+    let is_clear = |[lower, upper]: [f64; 2]| lower > TIE || upper < 1.0 / TIE;
+    let is_told = ratio.ends().is_none_or(is_clear);
+    is_told.then_some(ratio.value > 1.0)
 }
 
 /// Ratio of two costs from the ratio of the times in them.
@@ -261,8 +256,7 @@ impl Check {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rule::tests::some_rule;
-    use super::super::rule::{Finding, Omission};
+    use super::super::rule::{Finding, Omission, some_rule};
     use super::*;
 
     /// A check with a ratio of times and what each side misses.

@@ -10,7 +10,7 @@ use super::run_table::{heads, structures};
 use super::run_verdict::{gains, times};
 use super::study::{Study, load, note_solid};
 use super::text::{self, significant, some, time_within};
-use super::{Ending, print, tell};
+use super::{Ending, print};
 use crate::advise::{
     self, Advice, AdviseInput, Axis, Check, Omission, Side, TestRow, ns, policy_of,
 };
@@ -50,7 +50,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
             _ => None,
         };
         parts.extend(study.workers.found(process, scene, &begin, part)?);
-        study.advance();
+        study.bar.inc(1);
     }
     let prepared = advise::prepare(&input, Group::of(&parts).cells, &begin)?;
     let step = "with and without every rule";
@@ -95,9 +95,7 @@ fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> R
     let all = text::counted(setting.path.cameras.len(), "camera");
     if setting.path.cameras.len() > MOST_CAMERAS && timing.is_none() {
         let used = text::count(MOST_CAMERAS);
-        tell(&format!(
-            "note: the rules look at {used} of {all}, evenly spread"
-        ));
+        tell!("note: the rules look at {used} of {all}, evenly spread");
     }
     setting.path = setting.path.at_most(MOST_CAMERAS);
     setting.protocol.cameras = cameras_within(SUITES[0].effort.pass_ns, setting.scene.items.len());

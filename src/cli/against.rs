@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, Result, bail};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::json;
@@ -40,7 +40,7 @@ pub fn compare_against<'a>(
     registry: &Registry,
     args: &'a CompareArgs,
     binary: &Path,
-) -> anyhow::Result<CompareTable<'a>> {
+) -> Result<CompareTable<'a>> {
     let threshold = args.threshold;
     let is_timed = args.gate == Gate::Time;
     if is_timed && threshold < LEAST_THRESHOLD {
@@ -63,10 +63,11 @@ pub fn compare_against<'a>(
     let patience = Duration::from_secs(args.what.timeout);
     // There are no pipes, and so no folder for them.
     let workers = || Workers::new(of_run.clone(), patience, Path::new(""));
-    let duel = Duel {
+    let mut duel = Duel {
         args,
         plan: &plan.plan,
         sides: [workers()?.of(binary), workers()?.of(&own)],
+        rng: Pcg64::seed_from_u64(plan.plan.seed),
     };
     // Before it begins: afterwards the load is its own.
     let busy = Machine::capture().busy().filter(|_| is_timed);
@@ -86,7 +87,7 @@ pub fn compare_against<'a>(
 }
 
 /// Line on the default structures of a run that a comparison lacks.
-fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> anyhow::Result<Option<String>> {
+fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> Result<Option<String>> {
     let default = registry.structures(args.moves.list(DEFAULT))?.into_iter();
     // As labels stand before a policy of updates.
     let compared = of.plan.structures.iter();
@@ -99,7 +100,7 @@ fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> anyhow::Resul
 }
 
 /// The program of a name, as in a shell: one without a folder is looked up in PATH.
-fn program(name: &Path) -> anyhow::Result<PathBuf> {
+fn program(name: &Path) -> Result<PathBuf> {
     let found = match name.parent() {
         Some(folder) if folder.as_os_str().is_empty() => {
             let path = std::env::var_os("PATH").unwrap_or_default();
@@ -118,7 +119,7 @@ fn program(name: &Path) -> anyhow::Result<PathBuf> {
 }
 
 /// A program as one side of the comparison.
-fn side(program: &Path) -> anyhow::Result<Side> {
+fn side(program: &Path) -> Result<Side> {
     let bytes = fs::read(program).with_context(|| program.display().to_string())?;
     let digest = scene::hex(&hmac_sha256::Hash::hash(&bytes));
     Ok(Side {
@@ -128,12 +129,12 @@ fn side(program: &Path) -> anyhow::Result<Side> {
 }
 
 /// The options of `run` that were typed behind `compare`.
-fn typed() -> anyhow::Result<Vec<String>> {
+fn typed() -> Result<Vec<String>> {
     Ok(TypedOptions::of("compare", "run", std::env::args_os())?.words(|_| true))
 }
 
 /// The arguments of `run` for the same measurement.
-fn arguments(structures: &str) -> anyhow::Result<Vec<String>> {
+fn arguments(structures: &str) -> Result<Vec<String>> {
     let mut arguments = vec!["run".to_owned()];
     arguments.extend(typed()?);
     for (option, value) in [("--suite=", SUITE), ("--structure=", structures)] {
@@ -145,7 +146,7 @@ fn arguments(structures: &str) -> anyhow::Result<Vec<String>> {
 }
 
 /// Refuses options of a measurement where nothing is measured.
-pub fn expect_none_of_a_run() -> anyhow::Result<()> {
+pub fn expect_none_of_a_run() -> Result<()> {
     if let Some(option) = typed()?.first().and_then(|typed| typed.split('=').next()) {
         bail!(
             "{option} says what --against BINARY measures, and two reports are measured already; \
@@ -184,6 +185,7 @@ struct Duel<'a> {
     plan: &'a Plan,
     /// Workers by the arguments of `run` that the plan follows from.
     sides: [Workers; 2],
+    rng: Pcg64,
 }
 
 impl Duel<'_> {
@@ -193,14 +195,13 @@ impl Duel<'_> {
     /// # Errors
     /// A program that cannot be started or is of another version, a scene that
     /// it cannot read.
-    fn run(&self) -> anyhow::Result<(Changes, String)> {
+    fn run(&mut self) -> Result<(Changes, String)> {
         let started = Instant::now();
         let (first, most) = pairs(self.args);
         let bar = progress(most as u64, " pairs");
         let mut told = started;
         bar.set_message("counting and checking answers");
         let mut seen = self.count()?;
-        let mut rng = Pcg64::seed_from_u64(self.plan.seed);
         let mut pairs = 0;
         loop {
             let is_due = pairs >= first && (pairs - first).is_multiple_of(MORE);
@@ -228,7 +229,7 @@ impl Duel<'_> {
             tell_progress(&bar, "pairs", &mut told);
             bar.set_message("pairs of processes");
             for scene in 0..self.plan.scenes.len() {
-                let both = self.pair(scene, pairs as u32, &seen, &mut rng)?;
+                let both = self.pair(scene, pairs as u32, &seen)?;
                 for (seen, own) in seen.iter_mut().zip(both) {
                     seen.extend(own);
                 }
@@ -258,7 +259,7 @@ impl Duel<'_> {
     }
 
     /// Has both sides count and check their answers.
-    fn count(&self) -> anyhow::Result<[Vec<Part>; 2]> {
+    fn count(&self) -> Result<[Vec<Part>; 2]> {
         let mut seen = [Vec::new(), Vec::new()];
         for scene in 0..self.plan.scenes.len() {
             // The plan is the new side's; the old one keeps to it.
@@ -299,23 +300,17 @@ impl Duel<'_> {
     }
 
     /// One pair of processes on one scene, in turns; old and new.
-    fn pair(
-        &self,
-        scene: usize,
-        pair: u32,
-        seen: &[Vec<Part>; 2],
-        rng: &mut Pcg64,
-    ) -> anyhow::Result<[Vec<Part>; 2]> {
+    fn pair(&mut self, scene: usize, pair: u32, seen: &[Vec<Part>; 2]) -> Result<[Vec<Part>; 2]> {
         let mut parts = [Vec::new(), Vec::new()];
         // Which side is started first, and gets the first memory, is drawn for every pair,
         // and apart from it whose turn is first: old, new, new, old, ...
-        let first: usize = rng.random_range(0..2);
-        let begins: usize = rng.random_range(0..2);
+        let first: usize = self.rng.random_range(0..2);
+        let begins: usize = self.rng.random_range(0..2);
         let mut workers = [None, None];
         for side in [first, 1 - first] {
             let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
             let job = Job::scene(scene, share, false);
-            let mut worker = self.sides[side].start(0, rng.random(), job)?;
+            let mut worker = self.sides[side].start(0, self.rng.random(), job)?;
             // A side is held for half of the time.
             worker.patience = worker.patience.saturating_mul(2);
             workers[side] = Some(worker);

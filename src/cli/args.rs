@@ -12,8 +12,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::command_args::{CompareArgs, FunnelArgs, SceneCommand, ViewArgs};
 use super::shared_args::{
-    CullingArgs, KernelArgs, LensArgs, MotionArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs,
-    TableFormat, WhatArgs,
+    CullingArgs, KernelArgs, MotionArgs, RowFormat, SceneArgs, SpreadArgs, StudyArgs, TableFormat,
+    WhatArgs,
 };
 use super::{program, text};
 
@@ -39,7 +39,12 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// List the available structures, scenes, paths, motions, tests and metrics
-    List(ListArgs),
+    List {
+        /// Topic to list [default: everything]
+        topic: Option<ListTopic>,
+        #[arg(long, value_enum, default_value = "table")]
+        format: TableFormat,
+    },
     /// Measure structures on scenes along camera paths (the main job)
     Run(RunArgs),
     /// Join the shards of a plan (run --shard) into one run
@@ -72,7 +77,10 @@ pub enum Command {
     #[command(subcommand)]
     Scene(SceneCommand),
     /// Show the machine, toolchain and source as recorded in reports
-    Env(EnvArgs),
+    Env {
+        #[arg(long, value_enum, default_value = "table")]
+        format: TableFormat,
+    },
     /// Measure one share of a run (started by `run` and `compare` themselves)
     #[command(hide = true)]
     Worker,
@@ -117,14 +125,6 @@ pub enum ListTopic {
     Tests,
     Metrics,
     Motions,
-}
-
-#[derive(Args, Debug)]
-pub struct ListArgs {
-    /// Topic to list [default: everything]
-    pub topic: Option<ListTopic>,
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: TableFormat,
 }
 
 #[derive(Args, Debug)]
@@ -223,8 +223,6 @@ pub struct QueryArgs {
     #[arg(long, value_enum, default_value = "csv")]
     pub format: RowFormat,
     #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
     pub culling: CullingArgs,
 }
 
@@ -281,8 +279,6 @@ pub struct VerifyArgs {
     pub seed: Option<u64>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
-    #[command(flatten)]
-    pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
 }
@@ -368,10 +364,4 @@ pub struct StressArgs {
     pub format: TableFormat,
     #[command(flatten)]
     pub kernel: KernelArgs,
-}
-
-#[derive(Args, Debug)]
-pub struct EnvArgs {
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: TableFormat,
 }

@@ -39,8 +39,6 @@ pub struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = samples)]
     pub samples: Option<SampleGrid>,
     #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
     pub culling: CullingArgs,
 }
 

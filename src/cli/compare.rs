@@ -2,6 +2,7 @@
 //! report.json and measures nothing; the verdicts come from `report`, the table
 //! from `compare_table`.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,6 @@ use crate::report::{
     Basis, Changes, JUDGED_METRICS, JudgedRow, Outcome, Report, ReportCell, Setting, WORK, changes,
     read_report, settings, unique, write_atomically,
 };
-use crate::shown::shortened;
 
 /// Characters of a metric's name and of a change in a chart.
 const METRIC: usize = 12;
@@ -179,7 +179,7 @@ fn figure(table: &CompareTable) -> Option<Figure> {
     let metrics = unique(changes.rows.iter().filter_map(|row| row.metric));
     let all = changes.rows.iter().filter_map(|row| {
         let (group, structure) = (&row.cell.group, &row.cell.structure);
-        let structure = &shortened(structure, 24);
+        let structure = &text::shortened(structure, 24);
         // As much as the narrowest page shows.
         let used = structure.chars().count() + metrics.get(1).map_or(0, |_| METRIC);
         let room = 48_usize.saturating_sub(used).min(36);
@@ -242,9 +242,13 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
 /// The run is the newest of the others under results/ if none is named.
 fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
     let file = baseline_file(name);
-    let expected = match names(BASELINES).as_slice() {
-        [] => "expected one that `run --save NAME` kept".to_owned(),
-        known => format!("available: {}", known.join(", ")),
+    // There may be no such folder.
+    let listing = fs::read_dir(BASELINES).into_iter().flatten().flatten();
+    let known = listing.filter_map(|entry| entry.file_name().into_string().ok());
+    let known = known.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));
+    let expected = match known.collect::<BTreeSet<String>>() {
+        none if none.is_empty() => "expected one that `run --save NAME` kept".to_owned(),
+        known => format!("available: {}", Vec::from_iter(known).join(", ")),
     };
     ensure!(
         file.is_file(),
@@ -254,7 +258,7 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
         return Ok([file, new]);
     }
     let old = read_report(&file)?.run;
-    let newest = newest_run(Path::new("results"), |path| {
+    let newest = newest_run(|path| {
         let run = read_report(&path.join("report.json")).ok()?.run;
         // A baseline may be named `report`.
         let is_run = path != Path::new(BASELINES);
@@ -264,14 +268,4 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
         "no run in results since the baseline; expected one to compare with it, or its folder",
     )?;
     Ok([file, newest])
-}
-
-/// Names of the baselines in a folder, sorted; none where there is no folder.
-fn names(folder: &str) -> Vec<String> {
-    let listing = fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = listing.filter_map(|entry| entry.file_name().into_string().ok());
-    let names = names.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));
-    let mut names: Vec<String> = names.collect();
-    names.sort();
-    names
 }

@@ -15,7 +15,6 @@ use crate::report::{
     Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
     grouped, unique,
 };
-use crate::shown::{number, plain};
 use crate::statistics::{Change, Judgement};
 
 /// Counters in the list; `--all` shows every one.
@@ -224,7 +223,7 @@ impl CompareTable<'_> {
         let changes = &self.changes;
         let groups = unique(changes.rows.iter().map(|row| &row.cell.group));
         let short = |group: &&GroupKey| place(group, left, short);
-        let full = |group: &&GroupKey| place(group, usize::MAX, plain);
+        let full = |group: &&GroupKey| place(group, usize::MAX, text::plain);
         let places = distinct(&groups, short, full);
         // Beside a common shift a verdict is no more than a place among the others.
         let shifts = changes.proven_shifts();
@@ -361,12 +360,9 @@ pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
         percent if percent.abs() < 1e6 => format!("{percent:+.1}"),
         percent => format!("{percent:+.2e}"),
     };
-    match interval {
-        Some((lower, upper)) => {
-            format!("{} % [{}, {}]", change(ratio), change(lower), change(upper))
-        }
-        None => format!("{} %", change(ratio)),
-    }
+    let interval = interval.map(|(lower, upper)| [lower, upper].map(change).join(", "));
+    let interval = text::some(interval, |ends| format!(" [{ends}]"));
+    format!("{} %{interval}", change(ratio))
 }
 
 /// Line on the change that all cells share.
@@ -390,7 +386,7 @@ fn work_line(work: &WorkChange) -> String {
         [old, new] if old != new && old.is_finite() && new.is_finite() => [old, new],
         _ => [work.old, work.new],
     };
-    let [old, new] = shown.map(number);
+    let [old, new] = shown.map(text::number);
     let ratio = Some(work.new / work.old).filter(|_| work.old != 0.0);
     let much = text::some(ratio, |ratio| format!(" ({})", change_of(ratio, None)));
     let (name, counter) = (name(&work.cell), work.counter);

@@ -1,8 +1,7 @@
 //! Diagrams: series of places over two axes, with their names beside the plot.
 
 use super::figure::{Axis, CHARACTER, Figure, LINE, Look, STRONG, class, line, mark};
-use super::text::{self, html};
-use crate::shown::shortened;
+use super::text::{self, html, shortened};
 
 /// Most characters of a name beside a plot.
 const NAME: usize = 20;
@@ -208,25 +207,26 @@ impl<'d> Diagram<'d> {
     fn names(&self) -> Vec<(String, [f64; 2], f64)> {
         let end = |series: &Series| {
             let last = series.points.last().map(|point| self.place(point.at));
-            (series.name.clone(), last.unwrap_or([100.0, self.height]))
+            let name = shortened(&series.name, NAME);
+            (name, last.unwrap_or([100.0, self.height]), 0.0)
         };
-        let level = |(at, name): &(f64, String)| (name.clone(), [100.0, self.y(*at)]);
-        let ends: Vec<(String, [f64; 2])> = match self.joined {
+        let level = |(at, name): &(f64, String)| {
+            let end = [100.0, self.y(*at)];
+            (shortened(name, NAME), end, 0.0)
+        };
+        let mut ends: Vec<(String, [f64; 2], f64)> = match self.joined {
             Joined::Apart => self.levels.iter().map(level).collect(),
             _ => self.series.iter().map(end).collect(),
         };
         let mut order: Vec<usize> = (0..ends.len()).collect();
         order.sort_by(|a, b| ends[*b].1[1].total_cmp(&ends[*a].1[1]));
         let mut free = self.height.max(LINE * (ends.len() + 1) as f64);
-        let mut placed = vec![0.0; ends.len()];
         for (n, &i) in order.iter().enumerate() {
             let above = LINE * (order.len() - 1 - n) as f64 + 10.0;
-            placed[i] = (ends[i].1[1] + 4.0).min(free).max(above);
-            free = placed[i] - LINE;
+            ends[i].2 = (ends[i].1[1] + 4.0).min(free).max(above);
+            free = ends[i].2 - LINE;
         }
-        let named = ends.into_iter().zip(placed);
-        let named = named.map(|((name, end), at)| (shortened(&name, NAME), end, at));
-        named.collect()
+        ends
     }
 
     /// Marks with names below the plot, for pictures; a page has its filter.

@@ -36,7 +36,7 @@ impl Block {
         [Block::heading(heading), Block::Table(table)]
     }
 
-    /// Sentence, as on what another option shows, below a gap; nothing if `all` is shown.
+    /// Sentence below a gap, as on what another option shows; nothing if `all`.
     pub fn more(all: bool, sentence: &str) -> impl Iterator<Item = Block> {
         let lines = ["", sentence].map(Block::line).into_iter();
         lines.filter(move |_| !all)

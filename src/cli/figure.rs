@@ -7,8 +7,7 @@
 use std::iter::successors;
 use std::ops::Range;
 
-use super::text::{self, html};
-use crate::shown::shortened;
+use super::text::{self, html, shortened};
 use crate::statistics::Estimate;
 
 /// Series of a figure with a colour; the others are grey.

@@ -21,7 +21,7 @@ use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{ROUNDS, Study, load, note_solid};
 use super::{
-    Ending, expect_folder, expect_places, funnel_table, print, tell, text, write_if, write_text,
+    Ending, expect_folder, expect_places, funnel_table, print, text, write_if, write_text,
 };
 use crate::funnel::{
     self, Chain, Fate, FunnelInput, FunnelReport, NONE, PickRow, StageKind, StageRow,
@@ -29,7 +29,6 @@ use crate::funnel::{
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Setting};
 use crate::scene::Scene;
-use crate::shown::lines;
 use crate::spec::SpecError;
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -43,18 +42,23 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
     if args.no_picks && !input.all {
-        tell("note: --no-picks has no effect; expected --all with it");
+        tell!("note: --no-picks has no effect; expected --all with it");
     }
+    let SampleGrid { width, height } = input.samples;
+    let items = text::counted(setting.scene.items.len(), "item");
+    let views = input.most_views.min(setting.path.cameras.len());
+    let views = text::counted(views, "view");
+    let work = format!("{items}, {views} of {width}x{height} samples");
     let is_begun = Cell::new(false);
     let begin = |step: &str| {
         // Refusals come before the first step.
         if !is_begun.replace(true) {
-            study.announce(&work(&input), "less than a minute");
+            study.announce(&work, "less than a minute");
         }
         study.begin(step);
     };
     let prepared = funnel::prepare(&input, &begin)?;
-    study.advance();
+    study.bar.inc(1);
     let path = &setting.path;
     let times = study.times("every stage, timed", path.lens_scale, &prepared.plan)?;
     if let Some(verdict) = funnel::failure(&times) {
@@ -72,16 +76,6 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     write_if(&args.html, || page(&report, &setting.scene))?;
     shown?;
     Ok(Ending::of(keep_their_word(&report.stages, &report.picks)))
-}
-
-/// Amount of work.
-fn work(input: &FunnelInput) -> String {
-    let SampleGrid { width, height } = input.samples;
-    let Setting { scene, path, .. } = input.setting;
-    let items = text::counted(scene.items.len(), "item");
-    let views = input.most_views.min(path.cameras.len());
-    let views = text::counted(views, "view");
-    format!("{items}, {views} of {width}x{height} samples")
 }
 
 /// Returns true if nothing visible is lost and nothing exact wrong.
@@ -186,7 +180,7 @@ pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
         let about = ["scene", "path"].map(str::to_owned).into_iter();
         out.write_record(about.chain(columns))?;
         for row in rows {
-            let own = [&report.scene, &report.path].map(|name| lines(name));
+            let own = [&report.scene, &report.path].map(|name| text::lines(name));
             let fields = fields.split_whitespace();
             let cells = fields.map(|path| row.pointer(&format!("/{path}")));
             let cells = cells.map(|value| text::some(value, cell));

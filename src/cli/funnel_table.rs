@@ -2,9 +2,8 @@
 //! each stage of the chain, and conclusions.
 
 use super::document::{Block, Column, Table};
-use super::text::{self, some};
+use super::text::{self, shortened, some};
 use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
-use crate::shown::shortened;
 use crate::visibility::Guarantee;
 use crate::visibility::fragment::Tally;
 

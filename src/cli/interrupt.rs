@@ -28,19 +28,12 @@ pub fn check() -> Result<(), Interrupted> {
     (!asked()).then_some(()).ok_or(Interrupted)
 }
 
-/// For a worker: a terminal sends Ctrl-C to the whole group, and it is the
-/// parent that decides what becomes of its workers.
-pub fn leave_to_the_parent() {
-    // Without it a worker ends early, and its parent is about to end it.
-    let _ = ctrlc::set_handler(|| ());
-}
-
 pub fn install() {
     let handler = || {
         if ASKED.swap(true, Ordering::Relaxed) || !TO_FINISH.load(Ordering::Relaxed) {
             std::process::exit(130);
         }
-        super::tell("stopping at the next safe place; again ends at once");
+        tell!("stopping at the next safe place; again ends at once");
     };
     if ignores_hangup() {
         return;
@@ -48,7 +41,7 @@ pub fn install() {
     // Without a handler Ctrl-C simply ends the program: nothing is lost but
     // the cell that was being measured.
     if let Err(error) = ctrlc::set_handler(handler) {
-        super::tell(&format!("warning: no clean stop on Ctrl-C: {error}"));
+        tell!("warning: no clean stop on Ctrl-C: {error}");
     }
 }
 

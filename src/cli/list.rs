@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 
-use super::args::{EnvArgs, ListArgs, ListTopic};
+use super::args::ListTopic;
 use super::document::Table;
 use super::shared_args::TableFormat;
 use super::{Ending, print, print_json, program, text};
@@ -21,14 +21,14 @@ use crate::suite::SUITES;
 /// Further columns of rows, in the order of the tables.
 const COLUMNS: &str = "kind origin capabilities timed params licence state unit";
 
-pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
+pub fn list(registry: &Registry, one: Option<ListTopic>, format: TableFormat) -> Result<Ending> {
     let topics = ListTopic::value_variants().to_vec();
-    let topics = args.topic.map_or(topics, |topic| vec![topic]);
+    let topics = one.map_or(topics, |topic| vec![topic]);
     let mut out = io::stdout().lock();
     let mut all = Map::new();
     for topic in topics {
         let (name, note, rows) = rows(registry, topic)?;
-        if args.format == TableFormat::Json {
+        if format == TableFormat::Json {
             all.insert(name.to_owned(), rows.into());
             continue;
         }
@@ -47,10 +47,10 @@ pub fn list(registry: &Registry, args: &ListArgs) -> Result<Ending> {
             writeln!(out, "{}\n", text::wrapped(note.trim_end(), text::width()))?;
         }
     }
-    if args.format == TableFormat::Json {
+    if format == TableFormat::Json {
         // One topic is a plain array, all of them an object.
-        let one = all.values().next().filter(|_| args.topic.is_some());
-        print_json(&one.cloned().unwrap_or(Value::Object(all)))?;
+        let only = all.values().next().filter(|_| one.is_some());
+        print_json(&only.cloned().unwrap_or(Value::Object(all)))?;
     }
     Ok(Ending::Ok)
 }
@@ -177,13 +177,13 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
     })
 }
 
-pub fn env(args: &EnvArgs) -> Result<Ending> {
+pub fn env(format: TableFormat) -> Result<Ending> {
     let facts = json!({
         "machine": Machine::capture(),
         "toolchain": Toolchain::capture(),
         "source": Source::capture(),
     });
-    print(args.format, &facts, || {
+    print(format, &facts, || {
         let mut table = Table::of("fact | value");
         for (group, facts) in facts.as_object().into_iter().flatten() {
             for (name, value) in facts.as_object().into_iter().flatten() {

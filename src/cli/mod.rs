@@ -7,6 +7,11 @@
 //! Exit codes: 0 ok; 1 a wrong answer, none at all or a failed verification; 2 usage
 //! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
+/// Prints a line on stderr that `format!` makes.
+macro_rules! tell {
+    ($($line:tt)*) => { $crate::cli::tell(&format!($($line)*)) };
+}
+
 mod advise;
 mod against;
 mod args;
@@ -93,7 +98,7 @@ impl Ending {
     /// Ending of checks, told if interrupted: a wrong answer counts before that.
     fn of_checks(is_right: bool, interrupted: bool) -> Ending {
         if interrupted {
-            tell("interrupted: only the cases shown were checked");
+            tell!("interrupted: only the cases shown were checked");
         }
         match (is_right, interrupted) {
             (false, _) => Ending::WrongAnswer,
@@ -145,7 +150,9 @@ fn start(registry: Registry) -> ExitCode {
         Err(error) => return refused(&error),
     };
     match cli.command {
-        Command::Worker => interrupt::leave_to_the_parent(),
+        // A terminal sends Ctrl-C to the whole group, and it is the parent that decides what
+        // becomes of its workers. Without this one ends early: its parent is about to end it.
+        Command::Worker => drop(ctrlc::set_handler(|| ())),
         _ => {
             interrupt::install();
             hold_files(BTreeMap::new());
@@ -162,7 +169,7 @@ fn start(registry: Registry) -> ExitCode {
         // A reader who left is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
-            tell(&format!("error: {}", told_once(&error)));
+            tell!("error: {}", told_once(&error));
             ExitCode::from(2)
         }
     }
@@ -171,7 +178,7 @@ fn start(registry: Registry) -> ExitCode {
 /// Shows what the argument parser has to say: an error on one line, or the help.
 fn refused(error: &clap::Error) -> ExitCode {
     let failed = |line: String| {
-        tell(&format!("error: {line}"));
+        tell!("error: {line}");
         ExitCode::from(2)
     };
     if let Some(line) = program::one_line(error) {
@@ -187,7 +194,7 @@ fn refused(error: &clap::Error) -> ExitCode {
 /// Runs a command.
 fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
     match command {
-        Command::List(args) => list::list(registry, &args),
+        Command::List { topic, format } => list::list(registry, topic, format),
         Command::Run(args) => run::run(registry, &args),
         Command::Merge(args) => merge::merge(&args),
         Command::Report(args) => report::report(&args),
@@ -213,7 +220,7 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
         Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Scene(SceneCommand::Draw(args)) => scene::draw(registry, &args),
         Command::View(args) => view::view(registry, &args),
-        Command::Env(args) => list::env(&args),
+        Command::Env { format } => list::env(format),
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {
             let (mut script, all) = (Vec::new(), Cli::command());
@@ -264,9 +271,7 @@ fn load_scene(source: &str, options: &LoadOptions) -> Result<Scene> {
     let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         let (bad, name) = (text::counted(scene.skipped_items, "bad item"), &scene.name);
-        tell(&format!(
-            "note: {bad} left out of {name}; ids are rows of that file"
-        ));
+        tell!("note: {bad} left out of {name}; ids are rows of that file");
     }
     Ok(scene)
 }

@@ -35,27 +35,20 @@ impl Plan<'_> {
     /// The picture.
     pub fn svg(&self) -> String {
         let (mut items, mut notes) = self.items();
-        let mut outlines = Vec::new();
-        if let Some(cells) = &self.cells {
-            outlines = cells.outlines(self.scene);
-            notes.extend(cells.notes(self.scene.up));
-        }
-        let up = self.scene.up;
+        let (cells, up) = (self.cells.as_ref(), self.scene.up);
+        let outlines = cells.map_or(Vec::new(), |cells| cells.outlines(self.scene));
+        notes.extend(cells.iter().flat_map(|cells| cells.notes(up)));
         let eye = self.camera.map(|camera| up.to_z_up(camera.frame.eye));
         let corners = outlines.iter().flat_map(|outline| &outline.corners);
-        let cells = corners.map(|&corner| [corner; 2]);
+        let corners = corners.map(|&corner| [corner; 2]);
         let eye = eye.map(DVec3::truncate);
-        let sheet = Sheet::over(window(&items, cells, eye));
+        let sheet = Sheet::over(window(&items, corners, eye));
         outline_floors(&mut items, &sheet);
         let mut body = String::new();
-        if let Some(cells) = &self.cells {
-            cells.fill(&outlines, &sheet, &mut body);
-        }
+        cells.inspect(|cells| cells.fill(&outlines, &sheet, &mut body));
         self.draw_items(&items, &sheet, &mut body);
         self.draw_walls(&sheet, &mut body);
-        if let Some(cells) = &self.cells {
-            cells.draw(&outlines, &sheet, &mut body);
-        }
+        cells.inspect(|cells| cells.draw(&outlines, &sheet, &mut body));
         if let Some(camera) = self.camera {
             draw_camera(camera, up, &sheet, &mut body);
         }
@@ -95,10 +88,8 @@ impl Plan<'_> {
         all.sort_by(|(a, ..), (b, ..)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let far = all.len().saturating_sub(MOST_DRAWN);
         all.truncate(MOST_DRAWN);
-        let farther = match self.camera {
-            Some(_) => "farther from the eye",
-            None => "farther from the middle",
-        };
+        let farther = ["farther from the middle", "farther from the eye"];
+        let farther = farther[usize::from(self.camera.is_some())];
         let notes = [(apart, "on other storeys"), (far, farther)].into_iter();
         let notes = notes.filter(|(count, _)| *count > 0);
         let notes =

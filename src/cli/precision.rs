@@ -19,7 +19,6 @@ use crate::index::Registry;
 use crate::measure::{ProcessTimes, Setting, Status};
 use crate::precision::{self, Names, Point, Precision, SWEEPS, Sweep, SweepRow, sweep};
 use crate::report::grouped;
-use crate::statistics::Estimate;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -102,16 +101,11 @@ fn missed(point: &Point) -> u64 {
     point.counts.unwrap_or_default().false_negatives
 }
 
-fn ratio(a: &Point, b: &Point) -> String {
-    let both = a.query_ns().zip(b.query_ns());
-    text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
-}
-
 /// The false positives of a point in words.
 fn extras(point: &Point) -> String {
     match point.excess {
         None => "nothing is visible".to_owned(),
-        excess => format!("false positives {} %", percent(excess)),
+        excess => format!("false positives {} %", text::rate(excess, 100.0)),
     }
 }
 
@@ -128,7 +122,9 @@ fn of_points(p: &Precision) -> Vec<String> {
     let extra = |point: &Point| point.counts.map(|errors| errors.false_positives);
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
-        let (times, name, extra) = (ratio(tight, fastest), named(tight), extras(tight));
+        let both = tight.query_ns().zip(fastest.query_ns());
+        let times = text::significant(both.map_or(f64::NAN, |(a, b)| a / b));
+        let (name, extra) = (named(tight), extras(tight));
         all.push(format!(
             "Fewer false positives take {times} times as long or more: {name}, {extra}."
         ));
@@ -220,7 +216,7 @@ fn of_cameras(rows: &[SweepRow]) -> Option<String> {
 fn measured(point: &Point) -> Option<Measured> {
     let missed = missed(point);
     let (name, time) = (named(point), text::some(point.query_ns(), text::time));
-    let (rate, extra) = (point.excess?, percent(point.excess));
+    let (rate, extra) = (point.excess?, text::rate(point.excess, 100.0));
     Some(Measured {
         structure: point.structure.clone(),
         test: point.names.test.to_owned(),
@@ -239,9 +235,8 @@ fn measured(point: &Point) -> Option<Measured> {
 pub fn figure(p: &Precision) -> Option<Figure> {
     let (scene, path) = (&p.scene, &p.path);
     let caption = format!("{scene}, {path}: error against run time; dashed: misses visible items");
-    let axes = ["time per query", "false positives, % of visible"];
     let points = p.points.iter().filter_map(measured);
-    against(&caption, axes, 3e-5, points.collect())
+    against(&caption, 3e-5, points.collect())
 }
 
 /// The Pareto front within `room` characters.
@@ -331,10 +326,6 @@ pub fn numbers(names: &Names) -> String {
     format!("{arithmetic}{planes}{epsilon}")
 }
 
-pub fn percent(rate: Option<Estimate>) -> String {
-    text::rate(rate, 100.0)
-}
-
 /// Errors of each culling, the same on every structure.
 fn errors_table(points: &[Point]) -> Table {
     let all = grouped(points.iter().map(|p| (&p.names, p)));
@@ -344,7 +335,7 @@ fn errors_table(points: &[Point]) -> Table {
         ("culling", |p| culling(&p.names)),
         (">FP %", |p| match p.counts {
             None => p.status.name().to_owned(),
-            Some(_) => percent(p.excess),
+            Some(_) => text::rate(p.excess, 100.0),
         }),
         (">by source", |p| some(p.counts, text::sources)),
         (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
@@ -358,7 +349,7 @@ fn front_table(p: &Precision) -> Table {
         ("structure", |p| structure(p)),
         ("culling", |p| culling(&p.names)),
         (">query", |p| time_plus_minus(p.time)),
-        (">FP %", |p| percent(p.excess)),
+        (">FP %", |p| text::rate(p.excess, 100.0)),
         (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
         (">B/item", |p| format!("{:.1}", p.memory_bytes_per_item)),
         ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),

@@ -97,7 +97,14 @@ impl Worker {
                 return Ok(Some(Err(Ended::Died(structure, verdict))));
             }
             Err(RecvTimeoutError::Timeout) => return Ok(None),
-            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Err(self.obituary()?))),
+            Err(RecvTimeoutError::Disconnected) => {
+                let status = self.child.wait()?;
+                let words = self.last_words.take().and_then(|words| words.join().ok());
+                let words = String::from_utf8_lossy(&words.unwrap_or_default()).into_owned();
+                let (structure, step) = self.doing.clone();
+                let verdict = cause(status, &step, &words);
+                return Ok(Some(Err(Ended::Died(structure, verdict))));
+            }
         };
         self.waited = Duration::ZERO;
         let told = str::from_utf8(&line).ok();
@@ -142,14 +149,6 @@ impl Worker {
         }
         #[cfg(not(unix))]
         let _ = is_held;
-    }
-
-    fn obituary(&mut self) -> io::Result<Ended> {
-        let status = self.child.wait()?;
-        let words = self.last_words.take().and_then(|words| words.join().ok());
-        let words = String::from_utf8_lossy(&words.unwrap_or_default()).into_owned();
-        let (structure, step) = self.doing.clone();
-        Ok(Ended::Died(structure, cause(status, &step, &words)))
     }
 }
 

@@ -12,16 +12,15 @@ use serde_json::{Map, Value, json};
 
 use super::args::{LocateArgs, QueryArgs};
 use super::shared_args::RowFormat;
-use super::{Ending, load_scene, tell, unread_is_fine};
+use super::{Ending, load_scene, unread_is_fine};
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
-use crate::input::{is_readable, read_file, tell_warnings};
+use crate::input::{is_readable, note, read_file, tell_warnings};
 use crate::measure::{Answer, Workload, guarded, input_of};
 use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, available_bytes, read_sought_boxes_csv};
-use crate::shown::lines;
 use crate::threads::share;
 
 /// Points that are the camera places of the scene.
@@ -29,20 +28,30 @@ const PLACES: &str = "places";
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
-    let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let mut scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
+    let (defaults, culling) = (
+        args.culling.lens.defaults()?,
+        args.culling.culling(&args.test)?,
+    );
+    let mut scene = load_scene(&args.scene, &args.culling.lens.scene_args.options(1))?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let mut motion = None;
     if let Some(source) = &args.motion {
         let own = Motion::load(source, &scene)?.seen_by(&cameras, 1);
-        advance(&mut scene.items, &own, args.frame)?;
+        let (frames, name) = (own.frames(), &own.name);
+        let wanted = args.frame.map_or(frames, |frame| frame as usize);
+        anyhow::ensure!(
+            wanted <= frames,
+            "--frame is {wanted}; expected at most {frames}, the frames of '{name}'"
+        );
+        let mut replay = own.replay();
+        for _ in 0..wanted {
+            replay.advance(&mut scene.items);
+        }
         motion = Some(own);
     }
     let workload = Workload::moving(&scene, &cameras, &culling, motion, 1)?;
     tell_warnings();
-    if let Some(doubt) = culling.unproven() {
-        tell(&format!("note: {doubt}"));
-    }
+    culling.unproven().iter().for_each(|doubt| note(doubt));
     let ask = frustum(&workload);
     let columns: [Column<Row>; 9] = [
         ("camera", &|row| json!(row.question)),
@@ -67,21 +76,6 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
 fn shown(scene: &Scene, row: &Row) -> Option<Vec<ItemId>> {
     let ids = row.ids.as_deref()?;
     Some(ids.iter().map(|&id| scene.row_of(id)).collect())
-}
-
-/// Moves items through `frame` frames of a motion, or through all of them.
-fn advance(items: &mut [Aabb], motion: &Motion, frame: Option<u32>) -> anyhow::Result<()> {
-    let (frames, name) = (motion.frames(), &motion.name);
-    let wanted = frame.map_or(frames, |frame| frame as usize);
-    anyhow::ensure!(
-        wanted <= frames,
-        "--frame is {wanted}; expected at most {frames}, the frames of '{name}'"
-    );
-    let mut replay = motion.replay();
-    for _ in 0..wanted {
-        replay.advance(items);
-    }
-    Ok(())
 }
 
 /// Counts a query with a camera's view, then returns the ids of the plain query.
@@ -216,7 +210,7 @@ pub fn ask_all(
                     if structures.len() > 1 =>
                 {
                     if from == 0 {
-                        super::tell(&format!("left out: {error}"));
+                        tell!("left out: {error}");
                     }
                     continue;
                 }
@@ -282,18 +276,18 @@ fn all_agree(rows: &[Row], what: &str) -> bool {
         if let Some(id) = row.stray {
             agree = false;
             let about = format!("{what} {}: {}", row.question, row.structure);
-            super::tell(&format!("error: {about} finds id {id}, which is no item's"));
+            tell!("error: {about} finds id {id}, which is no item's");
         }
         if base.answer != row.answer {
             agree = false;
             let is_alike = (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum);
-            super::tell(&format!(
+            tell!(
                 "error: {what} {}: {}, {}{}",
                 row.question,
                 base.told(),
                 row.told(),
                 ["", ", but other ids"][usize::from(is_alike)]
-            ));
+            );
         }
     }
     agree
@@ -359,7 +353,7 @@ pub fn write(
 pub fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
-        Value::String(text) => lines(text),
+        Value::String(text) => super::text::lines(text),
         Value::Array(ids) => ids.iter().map(cell).collect::<Vec<_>>().join(" "),
         other => other.to_string(),
     }

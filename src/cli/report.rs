@@ -18,7 +18,7 @@ use super::page::{glossary, origin};
 use super::run_table::{self, distinct, name, question};
 use super::surface_tables::{self, Picture};
 use super::{
-    Ending, expect_folder, expect_places, program, run_figures, run_plan, tell, text, write_if,
+    Ending, expect_folder, expect_places, program, run_figures, run_plan, text, write_if,
     write_text,
 };
 use crate::measure::{Metric, Status};
@@ -52,16 +52,16 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     write_if(&args.markdown, markdown)?;
     if let Some(path) = &args.bencher {
         if report.run.finished_at.is_none() {
-            tell("note: the run was not finished; its cells have fewer processes or are missing");
+            tell!("note: the run was not finished; its cells have fewer processes or are missing");
         }
         write_text(path, &bencher(&report)?)?;
     }
     if let Some(folder) = &args.svg {
         match &surface_tables::pictures(&report)[..] {
-            [] => tell(&format!(
+            [] => tell!(
                 "note: no chart in {}; a chart needs a structure with times",
                 folder.display()
-            )),
+            ),
             pictures => write_charts(folder, pictures)?,
         }
     }
@@ -251,7 +251,12 @@ fn bencher(report: &Report) -> serde_json::Result<String> {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let benchmarks = cells.map(|cell| {
         let measures = METRICS.split(' ').filter_map(|metric| {
-            let value = of_metric(cell.metrics.get(metric)?);
+            let found = cell.metrics.get(metric)?;
+            let mut value = json!({ "value": found.value });
+            if let Some([lower, upper]) = found.estimate().ends() {
+                value["lower_value"] = json!(lower);
+                value["upper_value"] = json!(upper);
+            }
             // Bencher has `latency` in ns by itself.
             let name = metric.replace("query_ns", "latency").replace('_', "-");
             Some((name, value))
@@ -262,16 +267,6 @@ fn bencher(report: &Report) -> serde_json::Result<String> {
         (name, Value::Object(measures.collect()))
     });
     serde_json::to_string_pretty(&benchmarks.collect::<Map<_, _>>()).map(|text| text + "\n")
-}
-
-/// A value with its interval, if there is one.
-fn of_metric(metric: &Metric) -> Value {
-    let mut found = json!({ "value": metric.value });
-    if let (Some(lower), Some(upper)) = (metric.lower, metric.upper) {
-        found["lower_value"] = json!(lower);
-        found["upper_value"] = json!(upper);
-    }
-    found
 }
 
 /// Digits of a commit that name it.

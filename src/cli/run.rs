@@ -15,11 +15,9 @@ use super::interrupt::{self, Interrupted};
 use super::processes::{Ended, Job, Message, Workers};
 use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
-use super::run_resume::{TypedOptions, create, go_on, resume};
+use super::run_resume::{TypedOptions, create, resume};
 use super::study::{progress, tell_progress};
-use super::{
-    Ending, compare, expect_folder, interrupt, program, run_why, tell, text, unread_is_fine,
-};
+use super::{Ending, compare, expect_folder, interrupt, program, run_why, text, unread_is_fine};
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
@@ -39,14 +37,24 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
             .with_context(|| stopped.path.display().to_string())?;
         check_why(&begun, &plan)?;
         interrupt::from_now_on_finish();
-        let folder = go_on(stopped, &stream)?;
+        if stopped.lost > 0 {
+            let (run, parts) = (stopped.path.display(), text::counted(stopped.lost, "part"));
+            tell!("note: {run}: samples.csv lacks samples; {parts} measured again");
+        }
+        let folder = stopped.go_on(&stream)?;
         return Run::new(&begun, plan.plan, folder, stream)?.all();
     }
     let plan = plan(registry, args)?;
     check_why(args, &plan)?;
     plan.check_inputs()?;
     if args.plan {
-        return print_plan(&plan.plan);
+        // The cells as JSON lines, nothing measured.
+        let mut out = io::stdout().lock();
+        for cell in plan.plan.cells() {
+            writeln!(out, "{}", serde_json::to_string(&cell)?)?;
+        }
+        out.flush()?;
+        return Ok(Ending::Ok);
     }
     if plan.plan.scenes.is_empty() {
         bail!(
@@ -69,16 +77,6 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
         bail!("--why is '{why}'; expected a structure that is measured: {labels}");
     }
     Ok(())
-}
-
-/// The cells as JSON lines, nothing measured.
-fn print_plan(plan: &Plan) -> Result<Ending> {
-    let mut out = io::stdout().lock();
-    for cell in plan.cells() {
-        writeln!(out, "{}", serde_json::to_string(&cell)?)?;
-    }
-    out.flush()?;
-    Ok(Ending::Ok)
 }
 
 /// A run on its way.
@@ -128,7 +126,7 @@ impl<'a> Run<'a> {
             drop(self.workers);
             self.folder.discard();
             if failed.is_none() {
-                tell("interrupted: no cell was finished, and nothing was saved");
+                tell!("interrupted: no cell was finished, and nothing was saved");
             }
             return failed.map_or(Ok(Ending::Interrupted), Err);
         }
@@ -160,9 +158,7 @@ impl<'a> Run<'a> {
         if stopped {
             let (name, folder) = (program::name(), self.folder.path().display().to_string());
             let again = format!("{name} run --resume --out {}", text::quoted(&folder));
-            tell(&format!(
-                "interrupted: finished cells were saved; continue with {again}"
-            ));
+            tell!("interrupted: finished cells were saved; continue with {again}");
             return Ok(Ending::Interrupted);
         }
         Ok(Ending::of(!report.has_failed()))

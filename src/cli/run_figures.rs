@@ -200,8 +200,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let mut points: Vec<Measured> = cells.filter_map(measured).collect();
     points.sort_by(|a, b| a.point.at[0].total_cmp(&b.point.at[0]));
     let caption = format!("{}: error against run time, by test", of(first));
-    let axes = ["time per query", "false positives, % of visible"];
-    against(&caption, axes, 1e-4, points)
+    against(&caption, 1e-4, points)
 }
 
 /// A point of a structure with a test.
@@ -244,14 +243,8 @@ fn levels(points: &[Measured]) -> Vec<(f64, String)> {
 
 /// Error against run time of points, the fastest first; `None` without any.
 ///
-/// `axes` are the titles of time and error. No error at all is drawn at `none`: a
-/// logarithmic axis has no zero.
-pub fn against(
-    caption: &str,
-    axes: [&str; 2],
-    none: f64,
-    mut points: Vec<Measured>,
-) -> Option<Figure> {
+/// No error at all is drawn at `none`: a logarithmic axis has no zero.
+pub fn against(caption: &str, none: f64, mut points: Vec<Measured>) -> Option<Figure> {
     points.first()?;
     let all = points.len();
     for own in &mut points {
@@ -286,9 +279,11 @@ pub fn against(
     y.ticks = y.powers(10.0);
     y.ticks.retain(|tick| *tick > none * 2.0);
     y.ticks.push(none);
-    let x = Axis::log(axes[0], places().map(|p| p.at[0]), 1.5, &text::time);
-    let (error, rest) = (axes[1], left_out(beyond));
-    let caption = format!("{caption}; up: {error}. Large: on the line of least error{rest}");
+    let times = places().map(|p| p.at[0]);
+    let x = Axis::log("time per query", times, 1.5, &text::time);
+    let large = "Large: on the line of least error";
+    let large = large.to_owned() + &left_out(beyond);
+    let caption = format!("{caption}; up: false positives, % of visible. {large}");
     let diagram = Diagram {
         front,
         levels,
@@ -318,7 +313,7 @@ mod tests {
                 point: Point::new([100.0, error]),
             };
             let points = vec![point(0.0), point(1.0)];
-            let drawn = against("", ["time", "error"], none, points).unwrap().parts;
+            let drawn = against("", none, points).unwrap().parts;
             let lines = drawn
                 .split("<line class=\"grid\" x1=\"0.00%\" x2=\"100.00%\" y1=\"")
                 .skip(1);

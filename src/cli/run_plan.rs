@@ -70,10 +70,10 @@ pub fn plan_of(
     let mut plan = Plan {
         scenes: scenes(args, &suite)?,
         cullings,
-        lens: args.lens.defaults()?,
+        lens: args.culling.lens.defaults()?,
         motions: Vec::new(),
         views_per_frame: 1,
-        load: args.lens.scene_args.options(structures.len()),
+        load: args.culling.lens.scene_args.options(structures.len()),
         structures,
         effort: suite.effort,
         bounds: !args.no_bounds,
@@ -81,9 +81,7 @@ pub fn plan_of(
     };
     args.moves.enter(&mut plan)?;
     each_once("scene", plan.scenes.iter().map(|scene| &scene.source))?;
-    for scene in &plan.scenes {
-        each_once("path", &scene.paths)?;
-    }
+    (plan.scenes.iter()).try_for_each(|scene| each_once("path", &scene.paths))?;
     each_once("motion", &plan.motions)?;
     if !plan.motions.is_empty() && plan.scenes.iter().any(|scene| scene.cold) {
         let suite = suite.name;
@@ -127,15 +125,7 @@ impl RunPlan {
     /// Reads every input: a mistake in the last file should not show after an
     /// hour. A suite as it comes is known to be sound.
     pub fn check_inputs(&self) -> Result<()> {
-        self.check_files()?;
-        for scene in &self.plan.scenes {
-            scene::check_fits(&scene.source, &self.plan.load)?;
-        }
-        self.check_scenes(&|_, _| Ok(()))
-    }
-
-    /// Refuses a file that is not there; of a suite's file the error names the suite.
-    pub fn check_files(&self) -> Result<()> {
+        // A file that is not there; of a suite's file the error names the suite.
         let scenes = self.plan.scenes.iter();
         let sources = scenes.flat_map(|scene| scene.paths.iter().chain([&scene.source]));
         for source in sources.chain(&self.plan.motions) {
@@ -149,7 +139,10 @@ impl RunPlan {
                 };
             }
         }
-        Ok(())
+        for scene in &self.plan.scenes {
+            scene::check_fits(&scene.source, &self.plan.load)?;
+        }
+        self.check_scenes(&|_, _| Ok(()))
     }
 
     /// Checks that the plan of a run that was begun is still the same, and so are its

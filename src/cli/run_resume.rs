@@ -13,7 +13,7 @@ use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
 use super::run_plan::{RunPlan, same_digest};
-use super::{program, tell, text};
+use super::{program, text};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
     Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, digits, read_report,
@@ -26,17 +26,15 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     let clock = SystemTime::now();
     let now = utc(clock);
     if clock != dated(clock) {
-        tell(&format!(
+        tell!(
             "note: the system's clock is out of range; the run is dated {now}; expected a year \
              from 1970 to 9999"
-        ));
+        );
     }
     let id = digits(clock);
     let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
-    let path = match &args.out {
-        Some(path) => path.clone(),
-        None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
-    };
+    let own = || PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug()));
+    let path = args.out.clone().unwrap_or_else(own);
     let typed = typed_args()?;
     let mut header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
     header.run.command = command_line(&typed);
@@ -81,30 +79,29 @@ fn digest(file: &Path) -> Option<String> {
 
 /// Opens the run to continue, with its options; writes nothing.
 pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
-    let path = match &args.out {
-        Some(path) => path.clone(),
-        None => newest_unfinished(Path::new("results"))?,
-    };
+    let path = args.out.clone().map_or_else(newest_unfinished, Ok)?;
     let (folder, stream) = StoppedRun::open(&path)?;
     let place = || path.display().to_string();
     let begun = same_options(&stream.header.args).with_context(place)?;
-    same_place(&stream.header, &begun).with_context(place)?;
+    // Times of another machine or program do not belong into one report.
+    let kernel = begun.what.culling.kernel.execution().with_context(place)?;
+    let here = Header {
+        schema_version: SCHEMA_VERSION,
+        machine: Machine::capture().by(kernel.kernel),
+        toolchain: Toolchain::capture(),
+        source: Source::capture(),
+        binary: binary_digest(),
+        ..stream.header.clone()
+    };
+    if let Some(differs) = stream.header.differs_in_place(&here) {
+        let why = format!("{differs} here; expected the same: begin a new run");
+        return Err(anyhow::Error::msg(why).context(place()));
+    }
     let suite = begun.what.suite.as_deref().unwrap_or_default();
     let before = stream.header.files.get(suite).cloned();
     let now = || digest(Path::new(suite)).unwrap_or_else(|| "missing".to_owned());
     same_digest("suite", suite, before, now).with_context(place)?;
     Ok((folder, stream, begun))
-}
-
-/// Continues a run.
-pub fn go_on(stopped: StoppedRun, stream: &Stream) -> Result<RunFolder> {
-    if stopped.lost > 0 {
-        let (run, parts) = (stopped.path.display(), text::counted(stopped.lost, "part"));
-        tell(&format!(
-            "note: {run}: samples.csv lacks samples; {parts} measured again"
-        ));
-    }
-    Ok(stopped.go_on(stream)?)
 }
 
 /// Options that do not change the measurement.
@@ -125,10 +122,10 @@ fn same_options(recorded: &[String]) -> Result<RunArgs> {
     }
     // What was typed now and is no part of the plan takes the place of what is recorded.
     let is_new = |name: &str| !now.words(|typed| typed == name).is_empty();
-    let mut line = vec!["run".to_owned()];
+    let mut line = [program::name(), "run"].map(str::to_owned).to_vec();
     line.extend(before.words(|name| !is_new(name)));
     line.extend(now.words(|_| true));
-    let all = Cli::try_parse_from(first().chain(line));
+    let all = Cli::try_parse_from(line);
     match all.map_err(one_line)?.command {
         Command::Run(args) => Ok(args),
         _ => bail!(NO_RUN),
@@ -159,10 +156,6 @@ fn one_line(error: clap::Error) -> anyhow::Error {
     anyhow::Error::msg(line.unwrap_or_else(|| NO_RUN.to_owned()))
 }
 
-fn first() -> std::iter::Once<String> {
-    std::iter::once(program::name().to_owned())
-}
-
 /// The options of a command, as they were typed behind it or another.
 pub struct TypedOptions {
     matches: ArgMatches,
@@ -173,7 +166,8 @@ pub struct TypedOptions {
 impl TypedOptions {
     /// The options of a run that was begun.
     pub fn recorded(args: &[String]) -> Result<TypedOptions> {
-        TypedOptions::of("run", "run", first().chain(args.to_vec()))
+        let line = [&[program::name().to_owned()][..], args].concat();
+        TypedOptions::of("run", "run", line)
     }
 
     /// Those of `owner` in a line of `command`.
@@ -229,26 +223,10 @@ impl TypedOptions {
     }
 }
 
-/// Times of another machine or program do not belong into one report.
-fn same_place(header: &Header, begun: &RunArgs) -> Result<()> {
-    let here = Header {
-        schema_version: SCHEMA_VERSION,
-        machine: Machine::capture().by(begun.what.culling.kernel.execution()?.kernel),
-        toolchain: Toolchain::capture(),
-        source: Source::capture(),
-        binary: binary_digest(),
-        ..header.clone()
-    };
-    if let Some(differs) = header.differs_in_place(&here) {
-        bail!("{differs} here; expected the same: begin a new run");
-    }
-    Ok(())
-}
-
-/// The folder in `results` that holds the newest of the runs that `of` reads.
-pub fn newest_run(results: &Path, of: impl Fn(&Path) -> Option<RunInfo>) -> Option<PathBuf> {
+/// The folder in results that holds the newest of the runs that `of` reads.
+pub fn newest_run(of: impl Fn(&Path) -> Option<RunInfo>) -> Option<PathBuf> {
     // No folder of results holds no run.
-    let listing = fs::read_dir(results).into_iter().flatten().flatten();
+    let listing = fs::read_dir("results").into_iter().flatten().flatten();
     let runs = listing.filter_map(|entry| {
         let run = of(&entry.path())?;
         let changed = entry.metadata().and_then(|found| found.modified()).ok();
@@ -257,20 +235,16 @@ pub fn newest_run(results: &Path, of: impl Fn(&Path) -> Option<RunInfo>) -> Opti
     runs.max().map(|(.., path)| path)
 }
 
-fn newest_unfinished(results: &Path) -> Result<PathBuf> {
-    let found = newest_run(results, |path| {
+fn newest_unfinished() -> Result<PathBuf> {
+    let found = newest_run(|path| {
         // Killed at the very end, a run lacks nothing but its report.
         let report = read_report(&path.join("report.json"));
         let is_finished = report.is_ok_and(|report| report.run.finished_at.is_some());
         let stream = (!is_finished).then(|| read_stream(&path.join("stream.jsonl")));
         Some(stream?.ok()?.0.header.run)
     });
-    found.with_context(|| {
-        format!(
-            "no unfinished run in {}; expected one to resume there, or its folder as --out DIR",
-            results.display()
-        )
-    })
+    let expected = "expected one to resume there, or its folder as --out DIR";
+    found.with_context(|| format!("no unfinished run in results; {expected}"))
 }
 
 #[cfg(test)]

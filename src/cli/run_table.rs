@@ -1,7 +1,8 @@
 //! Tables of the results of a run.
 //!
 //! One scene and path is a row per structure, several are a row each. The terminal shows a
-//! summary of them, documents all.
+//! summary of them, documents all. Names of cells: in a sentence, in a column of a table,
+//! and in few characters.
 
 use std::collections::BTreeSet;
 
@@ -9,8 +10,8 @@ use super::document::{Block, Table};
 use super::{run_verdict, scene_facts, text};
 use crate::culling::{Culling, CullingTest};
 use crate::measure::{CellKey, GroupKey, Status};
+use crate::path::CameraFacts;
 use crate::report::{Comparison, Overall, ReportCell, grouped, times_as_fast};
-use crate::shown::{plain, shortened, without_middle};
 use crate::spec::parse_number;
 use crate::statistics::Estimate;
 
@@ -239,11 +240,14 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
     // Unknown of a scene that did not load.
     let up: Vec<&str> = up.into_iter().filter(|up| !up.is_empty()).collect();
-    let lens = scene_facts::lenses(about().map(|cell| &cell.path));
+    // One value where it is the same in all.
+    let lens = about().filter_map(|cell| cell.path.lens.clone());
+    let lens = lens.reduce(CameraFacts::with);
+    let lens = lens.as_ref().map(scene_facts::lens);
     let [cache, test, _] = all.first().map(|one| key(one)).unwrap_or_default();
     let cache = if cache == "warm" { "" } else { ", cold" };
     let lens = lens.map(|lens| format!("{test}{cache}; {} up; {lens}", up.join(" or ")));
-    let cut = |label: &String| without_middle(&text::plain(label), [width / 4; 2]);
+    let cut = |label: &String| text::without_middle(&text::plain(label), [width / 4; 2]);
     let names = distinct(&labels(all), cut, |label| text::plain(label));
     let mut parts = matrix(names, all, overall).parts(width);
     let hidden = parts.split_off(1);
@@ -299,7 +303,7 @@ pub fn distinct<T: PartialEq>(
 pub fn short(source: &str) -> String {
     let Some((name, parameters)) = source.rsplit_once(':').filter(|(_, p)| p.contains('=')) else {
         let file = source.rsplit(['/', '\\']).next();
-        return shortened(file.unwrap_or(source), 24);
+        return text::shortened(file.unwrap_or(source), 24);
     };
     let value = |pair: &str| match pair.split_once('=')? {
         ("frames", _) => None,
@@ -308,7 +312,7 @@ pub fn short(source: &str) -> String {
         _ => Some(format!(" {pair}")),
     };
     let values = parameters.split(',').filter_map(value);
-    shortened(&format!("{name}{}", values.collect::<String>()), 36)
+    text::shortened(&format!("{name}{}", values.collect::<String>()), 36)
 }
 
 /// "100000" as "100k".
@@ -356,7 +360,7 @@ pub fn name(cell: &CellKey) -> String {
 
 /// Structure in at most twenty characters; its last parameter stays.
 pub fn short_structure(name: &str) -> String {
-    without_middle(&plain(name), [8, 9])
+    text::without_middle(&text::plain(name), [8, 9])
 }
 
 /// Scene and path in short, with the test and the cache state that are no defaults.
@@ -376,7 +380,7 @@ pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String
     }
     let most = room.saturating_sub(3);
     let left = most.saturating_sub(text::across(&rest) + 3).max(8);
-    shortened(&(shortened(&scene, left) + &rest), most)
+    text::shortened(&(text::shortened(&scene, left) + &rest), most)
 }
 
 /// All of a key that is no default, but for the scene.

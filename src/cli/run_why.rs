@@ -3,9 +3,8 @@
 use super::document::{Block, Table};
 use super::run_table::{distinct, groups, labels, settings};
 use super::run_verdict::times;
-use super::text::{self, some};
+use super::text::{self, shortened, some};
 use crate::report::{Comparison, Report, ReportCell, comparisons};
-use crate::shown::shortened;
 use crate::statistics::geometric_mean;
 
 /// Counters of a query, and their rows.

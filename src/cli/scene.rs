@@ -14,10 +14,10 @@ use super::plan::Plan;
 use super::scene_facts::{self, SceneFacts, people};
 use super::shared_args::TableFormat;
 use super::sheet::{Cells, Class};
-use super::{Ending, expect_places, interrupt, load_scene, print_json, tell, text, write_text};
-use crate::culling::{CameraView, Culling};
+use super::{Ending, expect_places, interrupt, load_scene, print_json, text, write_text};
+use crate::culling::Culling;
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, Registry, Row, StructureSpec, TreeCell, verdicts};
+use crate::index::{Registry, Row, StructureSpec, verdicts};
 use crate::measure::{SceneInfo, input_of};
 use crate::path::{self, CameraFacts};
 use crate::query::Containment;
@@ -146,23 +146,19 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
     if kept.skipped_items > 0 {
-        tell("note: ids of the new file are its own rows, without the bad items");
+        tell!("note: ids of the new file are its own rows, without the bad items");
     }
     if !lost.is_empty() {
         let what = "not written; boxes CSV has boxes and labels only";
-        tell(&format!("note: {} {what}", lost.join(", ")));
+        tell!("note: {} {what}", lost.join(", "));
     }
     if kept.up != UpAxis::default() {
         let up = kept.up.name();
-        tell(&format!(
-            "note: the file does not state that {up} is up; expected with it: --up {up}"
-        ));
+        tell!("note: the file does not state that {up} is up; expected with it: --up {up}");
     }
     if kept.origin != origin {
         let new = kept.origin;
-        tell(&format!(
-            "note: the file will be read with the origin {new}, not {origin}"
-        ));
+        tell!("note: the file will be read with the origin {new}, not {origin}");
     }
     write(kept, out)
 }
@@ -203,7 +199,7 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
             }
             written?;
             let items = text::counted(scene.items.len(), "item");
-            tell(&format!("{}: {items}", path.display()));
+            tell!("{}: {items}", path.display());
         }
         None => {
             let mut out = BufWriter::new(io::stdout().lock());
@@ -305,8 +301,18 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let cells = index.as_ref().map_or(Vec::new(), |index| index.cells());
     let verdicts = view.as_ref().map(|view| verdicts(&cells, view.as_any()));
     let class_of = match (&view, &index, &verdicts) {
+        // By what the query of the structure did with each item.
         (Some(view), Some(index), Some(verdicts)) => {
-            classes(&scene, view, index.as_ref(), &cells, verdicts)
+            let (mut class_of, mut visible) = (vec![REJECTED; scene.items.len()], Vec::new());
+            index.query(view.as_any(), &mut visible);
+            (visible.iter()).for_each(|&item| class_of[item as usize] = ACCEPTED);
+            let opened = cells.iter().zip(verdicts);
+            let opened = opened.filter(|(_, verdict)| **verdict == Some(Containment::Straddles));
+            for &item in opened.flat_map(|(cell, _)| cell.items) {
+                let class = &mut class_of[item as usize];
+                *class = if *class == ACCEPTED { VISIBLE } else { OUTSIDE };
+            }
+            class_of
         }
         (Some(view), ..) => {
             let class = |item: &Aabb| usize::from(view.as_any().sees(item));
@@ -353,7 +359,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     told += &text::any(deeper, "cell", |deeper| {
         format!("; not drawn: {deeper} below level {}", args.depth)
     });
-    tell(&format!("{}: {told}", args.out.display()));
+    tell!("{}: {told}", args.out.display());
     Ok(Ending::Ok)
 }
 
@@ -377,34 +383,10 @@ fn divided(registry: &Registry, text: &str) -> anyhow::Result<StructureSpec> {
     bail!("structure '{name}' has no cells to draw; expected one of {names}")
 }
 
-/// Class of each item by what a query did with it.
-fn classes(
-    scene: &Scene,
-    view: &CameraView,
-    index: &dyn DynIndex,
-    cells: &[TreeCell<'_>],
-    verdicts: &[Option<Containment>],
-) -> Vec<usize> {
-    let mut class_of = vec![REJECTED; scene.items.len()];
-    let mut visible = Vec::new();
-    index.query(view.as_any(), &mut visible);
-    for item in visible {
-        class_of[item as usize] = ACCEPTED;
-    }
-    for (cell, verdict) in cells.iter().zip(verdicts) {
-        if *verdict == Some(Containment::Straddles) {
-            for &item in cell.items {
-                let class = &mut class_of[item as usize];
-                *class = if *class == ACCEPTED { VISIBLE } else { OUTSIDE };
-            }
-        }
-    }
-    class_of
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::index::TreeCell;
     use crate::path::LensDefaults;
     use crate::query::{AnyVolume, ItemId, QueryCost};
     use crate::scene;

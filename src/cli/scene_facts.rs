@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::text;
 use crate::index::{Bvh, FrustumQuery, Input, RegionIndex};
-use crate::measure::{PathInfo, SceneInfo};
+use crate::measure::SceneInfo;
 use crate::path::{CameraFacts, LensDefaults, MatrixFacts};
 use crate::scene::{Scene, WorldBox};
 use crate::statistics::{quantile, sorted};
@@ -309,13 +309,6 @@ pub fn matrices(facts: &MatrixFacts) -> String {
         "{convention}, depth {near} to {far}{mirrored}; the first: eye {eye}, right {right}, up \
          {up}, forward {forward}"
     )
-}
-
-/// The same of several paths: one value where it is the same in all.
-pub fn lenses<'p>(paths: impl Iterator<Item = &'p PathInfo>) -> Option<String> {
-    let facts = paths.filter_map(|path| path.lens.as_ref());
-    let all = facts.cloned().reduce(CameraFacts::with)?;
-    Some(lens(&all))
 }
 
 fn shown([least, most]: [f64; 2]) -> String {

@@ -83,8 +83,6 @@ pub struct WhatArgs {
     #[command(flatten)]
     pub moves: MotionArgs,
     #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
     pub culling: CullingArgs,
 }
 
@@ -190,8 +188,8 @@ impl KernelArgs {
         let mut specs: Vec<StructureSpec> = Vec::new();
         for spec in registry.structures(list)? {
             let join = if spec.label.contains(':') { ',' } else { ':' };
-            let several = self.threads.iter().filter(|_| self.threads.len() > 1);
-            let shared = several.filter(|n| **n > 1);
+            let of_several = |n: &&usize| self.threads.len() > 1 && **n > 1;
+            let shared = self.threads.iter().filter(of_several);
             let labels = shared.map(|n| format!("{}{join}threads={n}", spec.label));
             // A structure without the parameter is entered once.
             let shared = labels.filter_map(|label| registry.structure(&label).ok());
@@ -262,9 +260,8 @@ pub struct SpreadArgs {
 
 impl SpreadArgs {
     /// The protocol of one of the processes, with its share of the `rounds` of a study.
-    pub fn protocol(&self, rounds: [usize; 2], process: u32) -> Protocol {
+    pub fn protocol(&self, [least, most]: [usize; 2], process: u32) -> Protocol {
         let processes = self.processes as usize;
-        let [least, most] = rounds;
         Protocol {
             rounds: [
                 (least / processes).max(LEAST_ROUNDS),
@@ -332,9 +329,11 @@ impl LensArgs {
     }
 }
 
-/// Derivation of planes, numbers of the culling test, and its execution.
+/// Lens, derivation of planes, numbers of the culling test, and its execution.
 #[derive(Args, Debug)]
 pub struct CullingArgs {
+    #[command(flatten)]
+    pub lens: LensArgs,
     /// Derivation of the planes: frame, frame-f32, or by Gribb and Hartmann (gh)
     /// from a matrix of OpenGL (gl), D3D (d3d) or reversed z (revz): gh-gl-f32,
     /// gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64

@@ -96,7 +96,7 @@ pub fn note_solid(scene: &Scene, format: TableFormat) {
     let is_file = is_readable(Path::new(split_part(&scene.name).0));
     let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
     if format == TableFormat::Table && is_file && is_boxes {
-        tell("warning: items count as solid boxes; the meshes in them may hide less");
+        tell!("warning: items count as solid boxes; the meshes in them may hide less");
     }
 }
 
@@ -118,7 +118,7 @@ pub fn or_left_out(
     let line = text::plain(&left_out.to_string());
     print(format, &document, || writeln!(io::stdout(), "{line}"))?;
     for file in files.iter().filter_map(|file| file.as_ref()) {
-        tell(&format!("note: {}: not written", file.display()));
+        tell!("note: {}: not written", file.display());
     }
     Ok(Ending::Ok)
 }
@@ -129,7 +129,7 @@ const LONG: Duration = Duration::from_secs(10);
 /// A study on its way.
 pub struct Study {
     pub workers: Workers,
-    bar: ProgressBar,
+    pub bar: ProgressBar,
     /// Text before every step.
     about: String,
     processes: u32,
@@ -176,11 +176,6 @@ impl Study {
         self.bar.set_message(text::plain(&message));
     }
 
-    /// Counts a finished step.
-    pub fn advance(&self) {
-        self.bar.inc(1);
-    }
-
     /// The times of all processes, one after the other, by the plan of the command.
     ///
     /// From now on Ctrl-C stops the work at the next safe place; before it ends the program.
@@ -200,7 +195,7 @@ impl Study {
             if process == 1 && self.bar.is_hidden() && left > LONG {
                 let left = HumanDuration(left);
                 let step = format!("at work: {step}: 1 of {} processes done", self.processes);
-                tell(&format!("{step}, {left:#} left"));
+                tell!("{step}, {left:#} left");
             }
             let timing = Timing {
                 process,
@@ -213,7 +208,7 @@ impl Study {
             };
             let job = Job::Times(timing);
             all.extend((self.workers).found(process, job, &|_| self.begin(step), times)?);
-            self.advance();
+            self.bar.inc(1);
         }
         Ok(all)
     }

@@ -6,7 +6,7 @@ use std::iter;
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 
-pub use crate::shown::{count, counted, first_of, lines, message, plain, significant, time, unit};
+pub use crate::shown::*;
 use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
 

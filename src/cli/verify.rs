@@ -23,7 +23,6 @@ use crate::path::{self, CameraPath};
 use crate::query::{ItemId, Located};
 use crate::report::grouped;
 use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
-use crate::shown::shortened;
 use crate::verify::{
     ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
     points_on_faces, scan, variants,
@@ -43,14 +42,20 @@ const CASES: u64 = 20_000;
 
 pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> {
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
-    let defaults = args.lens.defaults()?;
+    let lens = &args.culling.lens;
+    let defaults = lens.defaults()?;
     let culling = args.culling.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
     let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
     // Random cases alone, if only they are named.
     let scenes = match (&args.scene[..], args.cases) {
         ([], Some(_)) if !by_hand => Vec::new(),
-        ([], _) => default_scenes(),
+        ([], _) => {
+            let generated = FAMILIES.iter().map(|f| format!("{}:n={ITEMS}", f.name));
+            let real = SAMPLES.iter().map(|s| s.name.to_owned());
+            let far = "city:n=5000,offset=1e7".to_owned();
+            generated.chain([far]).chain(real).collect()
+        }
         (named, _) => {
             let parts = named.iter().map(|source| every_part(source));
             parts.collect::<Result<Vec<_>, _>>()?.concat()
@@ -64,9 +69,13 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
     let (mut checks, mut skipped_items, mut interrupted) = (Vec::new(), 0, false);
+    // The command that checks a scene and path alone has the other options as typed.
+    let own = ["scene", "path", "cases", "seed", "format"];
+    let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
+    let others = typed.words(|name| !own.contains(&name));
     'scenes: for source in &scenes {
         bar.set_message(text::plain(source));
-        let scene = load_scene(source, &args.lens.scene_args.options(2 * structures.len()))?;
+        let scene = load_scene(source, &lens.scene_args.options(2 * structures.len()))?;
         skipped_items += scene.skipped_items;
         let subjects = [CullingTest::SixPlane, CullingTest::Sphere].map(|test| {
             let build = |spec| Subject::build(spec, false, &scene, test);
@@ -74,7 +83,8 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         });
         for path in paths(args, &scene) {
             let cameras = path::load(&path, &scene, &defaults)?;
-            let again = reproduce(source, &path)?;
+            let words = ["verify", "--scene", source, "--path", &path].map(str::to_owned);
+            let again = command_line(&[&words[..], &others].concat());
             checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
             interrupted = interrupt::asked();
             if interrupted {
@@ -142,28 +152,12 @@ fn check_path(
     Ok(rows)
 }
 
-fn default_scenes() -> Vec<String> {
-    let generated = FAMILIES.iter().map(|f| format!("{}:n={ITEMS}", f.name));
-    let real = SAMPLES.iter().map(|s| s.name.to_owned());
-    let far = "city:n=5000,offset=1e7".to_owned();
-    generated.chain([far]).chain(real).collect()
-}
-
 fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
     if !args.path.is_empty() {
         return args.path.clone();
     }
     let own = (!scene.places.is_empty()).then_some("places");
     PATHS.into_iter().chain(own).map(str::to_owned).collect()
-}
-
-/// The command that checks this scene and path alone; other options as typed.
-fn reproduce(scene: &str, path: &str) -> anyhow::Result<String> {
-    let own = ["scene", "path", "cases", "seed", "format"];
-    let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
-    let others = typed.words(|name| !own.contains(&name));
-    let words = ["verify", "--scene", scene, "--path", path].map(str::to_owned);
-    Ok(command_line(&[words.to_vec(), others].concat()))
 }
 
 /// The queries of a path for each kind of volume, and for each other culling test
@@ -249,18 +243,6 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
 }
 
 impl Check {
-    fn new(scene: &str, path: &str, structure: &StructureSpec) -> Check {
-        Check {
-            scene: scene.to_owned(),
-            path: path.to_owned(),
-            structure: structure.label.clone(),
-            volumes: 0,
-            verdicts: 0,
-            status: Status::Ok.name(),
-            difference: None,
-        }
-    }
-
     /// False where an answer is wrong or not there.
     fn is_answered(&self) -> bool {
         self.status == Status::Ok.name()
@@ -281,7 +263,9 @@ pub fn check(workload: &Workload, subjects: &[Subject], kind: &str, again: &str)
             verdicts: if is_asked { questions as u64 } else { 0 },
             status: status.name(),
             difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),
-            ..Check::new(&scene.name, &workload.path, &subject.spec)
+            scene: scene.name.clone(),
+            path: workload.path.clone(),
+            structure: subject.spec.label.clone(),
         }
     });
     checks.collect()
@@ -289,7 +273,13 @@ pub fn check(workload: &Workload, subjects: &[Subject], kind: &str, again: &str)
 
 fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Check> {
     let path = format!("{} from seed {seed}", text::counted(cases as usize, "case"));
-    let of = |structure| Check::new(RANDOM, &path, structure);
+    let of = |structure: &StructureSpec| Check {
+        scene: RANDOM.to_owned(),
+        path: path.clone(),
+        structure: structure.label.clone(),
+        status: Status::Ok.name(),
+        ..Check::default()
+    };
     let mut checks: Vec<Check> = structures.iter().map(of).collect();
     for case_seed in (0..cases).map(|i| seed.wrapping_add(i)) {
         if interrupt::asked() {
@@ -369,14 +359,11 @@ fn differ(
     Ok(())
 }
 
-#[cfg(test)]
-mod tests;
-
 /// Scene of the random cases.
 const RANDOM: &str = "random";
 
 /// One structure on one scene and path (or on all random cases).
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Check {
     scene: String,
     path: String,
@@ -409,7 +396,7 @@ fn show(outcome: &Outcome) -> io::Result<()> {
     let all = outcome.checks.iter();
     let all = grouped(all.map(|check| (check.structure.as_str(), check)));
     let columns: &[Column<&Vec<&Check>>] = &[
-        ("structure", |own| shortened(&own[0].structure, 30)),
+        ("structure", |own| text::shortened(&own[0].structure, 30)),
         (">paths", |own| {
             let of_paths = own.iter().filter(|check| check.scene != RANDOM);
             text::count(of_paths.count())
@@ -475,3 +462,6 @@ fn show(outcome: &Outcome) -> io::Result<()> {
     }
     text::print(&told)
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,13 +14,11 @@ use super::document::page;
 use super::query::{Row, ask_all, frustum};
 use super::study::progress;
 use super::text::{self, html};
-use super::{
-    Ending, expect_places, load_scene, program, scene_facts, tell, unread_is_fine, write_text,
-};
+use super::{Ending, expect_places, load_scene, program, scene_facts, unread_is_fine, write_text};
 use crate::camera::{Camera, ClipSpace};
 use crate::funnel::{RaysEnd, Shape};
 use crate::index::Registry;
-use crate::input::tell_warnings;
+use crate::input::{note, tell_warnings};
 use crate::measure::{SceneInfo, Workload};
 use crate::oracle::Verdict;
 use crate::path::{self, CameraFacts};
@@ -37,8 +35,11 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let out = Some(args.out.clone());
     expect_places(&[("--out", &out)], &[&args.scene, &args.path])?;
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
-    let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
+    let (defaults, culling) = (
+        args.culling.lens.defaults()?,
+        args.culling.culling(&args.test)?,
+    );
+    let scene = load_scene(&args.scene, &args.culling.lens.scene_args.options(1))?;
     let items = scene.items.len();
     let (found, most) = (text::count(items), text::count(MOST_ITEMS));
     ensure!(
@@ -51,9 +52,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let cameras = cameras.at_most(most);
     let workload = Workload::new(&scene, &cameras, &culling)?;
     tell_warnings();
-    if let Some(doubt) = culling.unproven() {
-        tell(&format!("note: {doubt}"));
-    }
+    culling.unproven().iter().for_each(|doubt| note(doubt));
     let (mut data, order) = ViewData::of(&scene, &cameras.name);
     let (mut answers, mut costs) = (Vec::<Box<[ItemId]>>::new(), Vec::new());
     let (ask, boxes, views) = (frustum(&workload), &workload.items, workload.views.len());

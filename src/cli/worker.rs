@@ -18,7 +18,7 @@ use super::args::{Cli, Command};
 use super::processes::{Job, Message, PROTOCOL, Request};
 use super::{advise, drift, funnel, precision, run_plan};
 use crate::index::{Registry, StructureSpec};
-use crate::measure::{Part, Plan, Share, TIMING, TaskSamples, measure_scene};
+use crate::measure::{Part, TIMING, TaskSamples, measure_scene};
 
 /// Error of a request whose job and arguments do not match.
 const OTHER: &str = "a job of another command";
@@ -71,7 +71,18 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
             if !plan.structures.iter().any(StructureSpec::is_threaded) {
                 stay_on(request.cpu);
             }
-            at.scene(&plan, scene, &share, samples)?;
+            let mut keep = |part: Part, of_tasks: Vec<TaskSamples>| {
+                let of_tasks = if samples { of_tasks } else { Vec::new() };
+                tell(&Message::Part(Box::new(part), of_tasks));
+            };
+            let notice = |structure: Option<&str>, step: &str| {
+                if at.set(structure, step) && step != TIMING {
+                    tell(&at.message());
+                } else {
+                    at.turns.fetch_add(1, Ordering::Relaxed);
+                }
+            };
+            measure_scene(&plan, &plan.scenes[scene], &share, &mut keep, &notice)?;
         }
         Job::Times(timing) => {
             stay_on(request.cpu);
@@ -115,23 +126,6 @@ impl At {
         let doing = self.doing.lock().unwrap_or_else(PoisonError::into_inner);
         let (structure, step) = doing.clone();
         Message::Doing { structure, step }
-    }
-
-    /// Measures one scene of a plan; sends samples only if they are `wanted`.
-    fn scene(&self, plan: &Plan, scene: usize, share: &Share, wanted: bool) -> anyhow::Result<()> {
-        let mut keep = |part: Part, samples: Vec<TaskSamples>| {
-            let samples = if wanted { samples } else { Vec::new() };
-            tell(&Message::Part(Box::new(part), samples));
-        };
-        let notice = |structure: Option<&str>, step: &str| {
-            if self.set(structure, step) && step != TIMING {
-                tell(&self.message());
-            } else {
-                self.turns.fetch_add(1, Ordering::Relaxed);
-            }
-        };
-        measure_scene(plan, &plan.scenes[scene], share, &mut keep, &notice)?;
-        Ok(())
     }
 
     fn tell_of_turns(self: Arc<Self>) {
