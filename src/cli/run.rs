@@ -17,7 +17,7 @@ use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, create, resume};
 use super::study::{progress, tell_progress};
-use super::{Ending, compare, expect_folder, interrupt, program, run_why, text, unread_is_fine};
+use super::{Ending, compare, expect_folder, program, run_why, text, unread_is_fine};
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
