@@ -1,5 +1,5 @@
-//! Tables in the source: enums whose values have names for people and files, and
-//! rows of structs. It defines how such a table is written down.
+//! Tables in the source: enums whose values have names for people and files, rows of
+//! structs, and fields with default values. It defines how such a table is written down.
 
 /// Declares an enum with its names: `ALL` in this order, and `name`.
 /// With the name of a table behind the enum's, each name is followed by its description,
@@ -39,6 +39,24 @@ macro_rules! named {
         /// Every value with its name and what it is.
         $vis const $TABLE: [($Enum, &str, &str); $Enum::ALL.len()] =
             [$(($Enum::$value, $name, $what)),+];
+    };
+}
+
+/// Declares a struct whose fields stand beside their default values.
+macro_rules! defaults {
+    ($(#[$about:meta])* $vis:vis struct $Struct:ident {
+        $($(#[$of:meta])* pub $field:ident: $Type:ty = $value:expr,)+
+    }) => {
+        $(#[$about])*
+        $vis struct $Struct {
+            $($(#[$of])* pub $field: $Type,)+
+        }
+
+        impl Default for $Struct {
+            fn default() -> Self {
+                $Struct { $($field: $value,)+ }
+            }
+        }
     };
 }
 

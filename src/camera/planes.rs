@@ -35,21 +35,14 @@ named! {
 /// planes (f64 to f32) and of the plane test itself.
 pub const DEFAULT_EPSILON: f64 = 8.0;
 
-/// How to derive the planes.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct PlaneOptions {
-    /// Which derivation, in which arithmetic.
-    pub method: PlaneMethod,
-    /// The factor c; 0 leaves the planes as they come.
-    pub epsilon: f64,
-}
-
-impl Default for PlaneOptions {
-    fn default() -> Self {
-        PlaneOptions {
-            method: PlaneMethod::default(),
-            epsilon: DEFAULT_EPSILON,
-        }
+defaults! {
+    /// How to derive the planes.
+    #[derive(Clone, Copy, PartialEq, Debug)]
+    pub struct PlaneOptions {
+        /// Which derivation, in which arithmetic.
+        pub method: PlaneMethod = PlaneMethod::default(),
+        /// The factor c; 0 leaves the planes as they come.
+        pub epsilon: f64 = DEFAULT_EPSILON,
     }
 }
 

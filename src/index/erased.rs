@@ -67,22 +67,14 @@ impl FromStr for UpdatePolicy {
     }
 }
 
-/// Kernel of queries and number of threads of builds. Answers do not depend on it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Execution {
-    /// Instruction set of queries.
-    pub kernel: Kernel,
-    /// Threads of builds, at least 1.
-    pub threads: usize,
-}
-
-/// The best kernel of this machine, and one thread.
-impl Default for Execution {
-    fn default() -> Self {
-        Execution {
-            kernel: Kernel::best(),
-            threads: 1,
-        }
+defaults! {
+    /// Kernel of queries and number of threads of builds. Answers do not depend on it.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    pub struct Execution {
+        /// Instruction set of queries.
+        pub kernel: Kernel = Kernel::best(),
+        /// Threads of builds, at least 1.
+        pub threads: usize = 1,
     }
 }
 

@@ -80,18 +80,14 @@ pub struct Linear {
     workers: Option<Workers>,
 }
 
-/// Parameters: `linear:threads=2`.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LinearParams {
-    /// Threads per frustum query, which share the blocks.
-    #[serde(skip_serializing_if = "is_one")]
-    pub threads: usize,
-}
-
-impl Default for LinearParams {
-    fn default() -> Self {
-        LinearParams { threads: 1 }
+defaults! {
+    /// Parameters: `linear:threads=2`.
+    #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LinearParams {
+        /// Threads per frustum query, which share the blocks.
+        #[serde(skip_serializing_if = "is_one")]
+        pub threads: usize = 1,
     }
 }
 

@@ -11,40 +11,27 @@ use crate::input::{InputError, Result, Row, TableReader, note};
 use crate::scene::{Scene, WorldBox, memory};
 use crate::shown::shortened;
 
-/// Values for columns that a file does not have, and lenses of generated paths.
-/// `None` leaves the choice to the path.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct LensDefaults {
-    /// Full vertical angle of view, 0 < fovy < 180; 60 if nothing is given.
-    pub fovy_deg: Option<f64>,
-    /// Width / height; 16:9 if nothing is given.
-    pub aspect: Option<f64>,
-    /// Distance of the near plane.
-    pub near: Option<f64>,
-    /// `Some(None)` is an infinite far plane.
-    pub far: Option<Option<f64>>,
-    /// Vector that is up in the image; [`load`](super::load) takes the scene's.
-    pub up: DVec3,
-    /// Middle of the scene; set by [`load`](super::load).
-    pub middle: DVec3,
-    /// Twice the scene's diagonal; set by [`load`](super::load).
-    pub reach: f64,
-    /// How files are to be read whose cameras are matrices.
-    pub matrix: Option<MatrixConvention>,
-}
-
-impl Default for LensDefaults {
-    fn default() -> Self {
-        LensDefaults {
-            fovy_deg: None,
-            aspect: None,
-            near: None,
-            far: None,
-            up: DVec3::Z,
-            middle: DVec3::ZERO,
-            reach: 1000.0,
-            matrix: None,
-        }
+defaults! {
+    /// Values for columns that a file does not have, and lenses of generated paths.
+    /// `None` leaves the choice to the path.
+    #[derive(Clone, Copy, PartialEq, Debug)]
+    pub struct LensDefaults {
+        /// Full vertical angle of view, 0 < fovy < 180; 60 if nothing is given.
+        pub fovy_deg: Option<f64> = None,
+        /// Width / height; 16:9 if nothing is given.
+        pub aspect: Option<f64> = None,
+        /// Distance of the near plane.
+        pub near: Option<f64> = None,
+        /// `Some(None)` is an infinite far plane.
+        pub far: Option<Option<f64>> = None,
+        /// Vector that is up in the image; [`load`](super::load) takes the scene's.
+        pub up: DVec3 = DVec3::Z,
+        /// Middle of the scene; set by [`load`](super::load).
+        pub middle: DVec3 = DVec3::ZERO,
+        /// Twice the scene's diagonal; set by [`load`](super::load).
+        pub reach: f64 = 1000.0,
+        /// How files are to be read whose cameras are matrices.
+        pub matrix: Option<MatrixConvention> = None,
     }
 }
 

@@ -40,22 +40,15 @@ pub enum PlaneSource {
     Import,
 }
 
-/// Parameters: `bsp:builder=sah,leaf=16`.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BspParams {
-    /// Source of the dividing planes.
-    pub builder: PlaneSource,
-    /// Most items of a leaf (1 to 4096).
-    pub leaf: u32,
-}
-
-impl Default for BspParams {
-    fn default() -> Self {
-        BspParams {
-            builder: PlaneSource::Auto,
-            leaf: 32,
-        }
+defaults! {
+    /// Parameters: `bsp:builder=sah,leaf=16`.
+    #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct BspParams {
+        /// Source of the dividing planes.
+        pub builder: PlaneSource = PlaneSource::Auto,
+        /// Most items of a leaf (1 to 4096).
+        pub leaf: u32 = 32,
     }
 }
 

@@ -24,22 +24,15 @@ pub type Bvh = Tree<BvhBuilder>;
 /// Builder of [`Bvh`].
 pub struct BvhBuilder;
 
-/// Parameters: `bvh:preset=medium,leaf=4`.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BvhParams {
-    /// obvhs's build preset: build time against tree quality.
-    pub preset: BvhPreset,
-    /// Most items of a leaf (1 to 255).
-    pub leaf: u32,
-}
-
-impl Default for BvhParams {
-    fn default() -> Self {
-        BvhParams {
-            preset: BvhPreset::VeryFast,
-            leaf: 32,
-        }
+defaults! {
+    /// Parameters: `bvh:preset=medium,leaf=4`.
+    #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct BvhParams {
+        /// obvhs's build preset: build time against tree quality.
+        pub preset: BvhPreset = BvhPreset::VeryFast,
+        /// Most items of a leaf (1 to 255).
+        pub leaf: u32 = 32,
     }
 }
 

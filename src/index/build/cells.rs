@@ -88,26 +88,18 @@ pub fn widest_axes<const AXES: usize>(bounds: &Aabb) -> [usize; AXES] {
     std::array::from_fn(|i| i + usize::from(i >= left_out))
 }
 
-/// Parameters of octree and quadtree: `octree:leaf=32,depth=20,loose=2`.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CellParams {
-    /// Most items of a leaf (1 to 4096).
-    pub leaf: u32,
-    /// Most levels of cells (0 to 64).
-    pub depth: u32,
-    /// Looseness (1 to 16): 1 sends every item down with its centre; k > 1
-    /// keeps items larger than k - 1 edges of the smaller cell where they are.
-    pub loose: f32,
-}
-
-impl Default for CellParams {
-    fn default() -> Self {
-        CellParams {
-            leaf: 32,
-            depth: 24,
-            loose: 1.0,
-        }
+defaults! {
+    /// Parameters of octree and quadtree: `octree:leaf=32,depth=20,loose=2`.
+    #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct CellParams {
+        /// Most items of a leaf (1 to 4096).
+        pub leaf: u32 = 32,
+        /// Most levels of cells (0 to 64).
+        pub depth: u32 = 24,
+        /// Looseness (1 to 16): 1 sends every item down with its centre; k > 1
+        /// keeps items larger than k - 1 edges of the smaller cell where they are.
+        pub loose: f32 = 1.0,
     }
 }
 

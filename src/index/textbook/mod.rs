@@ -21,20 +21,16 @@ use crate::query::{Containment, Context, ItemId, Predicate, QueryVolume, Recorde
 
 pub use divisions::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 
-/// Parameters: `octree-textbook:leaf=8,depth=64`.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TextbookParams {
-    /// Most items that are not divided any further (1 to 4096).
-    pub leaf: u32,
-    /// Most levels below the root (0 to 256), and so the depth of the recursion:
-    /// items that share a node there, such as coincident ones, stay together.
-    pub depth: u32,
-}
-
-impl Default for TextbookParams {
-    fn default() -> Self {
-        TextbookParams { leaf: 8, depth: 64 }
+defaults! {
+    /// Parameters: `octree-textbook:leaf=8,depth=64`.
+    #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct TextbookParams {
+        /// Most items that are not divided any further (1 to 4096).
+        pub leaf: u32 = 8,
+        /// Most levels below the root (0 to 256), and so the depth of the recursion:
+        /// items that share a node there, such as coincident ones, stay together.
+        pub depth: u32 = 64,
     }
 }
 
@@ -141,11 +137,16 @@ impl Node {
         ControlFlow::Continue(())
     }
 
-    /// Shows all nodes of a subtree with their levels, depth first.
-    fn each<'a>(&'a self, level: u32, show: &mut impl FnMut(&'a Node, u32)) {
-        show(self, level);
+    /// Adds the cells of a subtree with their levels, depth first.
+    fn add_cells<'a>(&'a self, level: u32, cells: &mut Vec<TreeCell<'a>>) {
+        cells.push(TreeCell {
+            level,
+            bounds: self.bounds,
+            half_space: self.half_space,
+            items: &self.ids,
+        });
         for child in &self.children {
-            child.each(level + 1, show);
+            child.add_cells(level + 1, cells);
         }
     }
 }
@@ -184,27 +185,18 @@ impl<D: Division> RegionIndex for Textbook<D> {
     }
 
     fn memory(&self) -> MemoryUsage {
-        let mut sum = MemoryUsage::default();
-        if let Some(root) = &self.root {
-            root.each(0, &mut |node, _| {
-                sum.node_bytes += size_of::<Node>();
-                sum.item_bytes += size_of_val(&node.boxes[..]) + size_of_val(&node.ids[..]);
-            });
+        let cells = self.cells();
+        let items: usize = cells.iter().map(|cell| cell.items.len()).sum();
+        MemoryUsage {
+            node_bytes: cells.len() * size_of::<Node>(),
+            item_bytes: items * (size_of::<Aabb>() + size_of::<ItemId>()),
         }
-        sum
     }
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
         if let Some(root) = &self.root {
-            root.each(0, &mut |node, level| {
-                cells.push(TreeCell {
-                    level,
-                    bounds: node.bounds,
-                    half_space: node.half_space,
-                    items: &node.ids,
-                });
-            });
+            root.add_cells(0, &mut cells);
         }
         cells
     }
