@@ -94,7 +94,7 @@ impl MemoryUsage {
 ///
 /// Items are numbered by their index in the slice. An empty box of finite numbers (min > max),
 /// such as [`REMOVED`](crate::motion::REMOVED), is an item that no query ever returns.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Default, Debug)]
 pub struct Input<'a> {
     /// The bounds of all items.
     pub items: &'a [Aabb],
@@ -114,10 +114,7 @@ impl<'a> Input<'a> {
     pub fn new(items: &'a [Aabb]) -> Input<'a> {
         Input {
             items,
-            own_tree: None,
-            pool: None,
-            spheres: false,
-            come_and_go: false,
+            ..Input::default()
         }
     }
 

@@ -68,6 +68,31 @@ pub enum Origin<Name = String> {
     StandIn(Name),
 }
 
+macro_rules! declares {
+    ($($(#[$about:meta])* $flag:ident)+) => {
+        impl Info {
+            $($(#[$about])*
+            pub const fn $flag(mut self) -> Info {
+                self.$flag = true;
+                self
+            })+
+        }
+    };
+}
+
+declares! {
+    /// Declares the capability `refits`.
+    refits
+    /// Declares the capability `ranges`.
+    ranges
+    /// Declares the capability `threaded_build`.
+    threaded_build
+    /// Declares [`Info::on_request`].
+    on_request
+    /// Declares [`Info::for_motion`].
+    for_motion
+}
+
 impl Info {
     /// Peak bytes per item of a build, its index included.
     ///
@@ -103,36 +128,6 @@ impl Info {
     /// A structure of this crate.
     pub(crate) const fn ours(name: &'static str, summary: &'static str, kind: Kind) -> Info {
         Info::new(name, summary, kind, Origin::Ours)
-    }
-
-    /// Declares the capability `refits`.
-    pub const fn refits(mut self) -> Info {
-        self.refits = true;
-        self
-    }
-
-    /// Declares the capability `ranges`.
-    pub const fn ranges(mut self) -> Info {
-        self.ranges = true;
-        self
-    }
-
-    /// Declares the capability `threaded_build`.
-    pub const fn threaded_build(mut self) -> Info {
-        self.threaded_build = true;
-        self
-    }
-
-    /// Declares [`Info::on_request`].
-    pub const fn on_request(mut self) -> Info {
-        self.on_request = true;
-        self
-    }
-
-    /// Declares [`Info::for_motion`].
-    pub const fn for_motion(mut self) -> Info {
-        self.for_motion = true;
-        self
     }
 
     /// Names of the declared capabilities.

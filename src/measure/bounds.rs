@@ -60,10 +60,7 @@ fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'
     let lengths: Vec<usize> = visible.iter().map(|&v| v as usize).collect();
     // Each query copies from another place, as answers do: always the first ids
     // would be always the same few cache lines.
-    let start = |(place, &length): (usize, &usize)| match count.checked_sub(length) {
-        Some(room) => scattered(place) % (room + 1),
-        None => 0,
-    };
+    let start = |(place, length)| scattered(place) % (count + 1 - length);
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
     lengths.iter().any(|&length| length > 0).then(|| {
         TimedTask::new(visible.to_vec(), move |place, out| {

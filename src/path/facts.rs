@@ -218,27 +218,28 @@ fn share(part: usize, cameras: &[Camera]) -> String {
     format!("{part} of {}", counted(cameras.len(), "camera"))
 }
 
+/// The share of the cameras that are of a kind, if any is.
+fn share_of(cameras: &[Camera], is_one: impl Fn(&&Camera) -> bool) -> Option<String> {
+    let count = cameras.iter().filter(is_one).count();
+    (count > 0).then(|| share(count, cameras))
+}
+
 /// View matrices without a projection, which see two units of width and height.
 fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
     let is_bare = |camera: &&Camera| camera.lens.matrix().is_some_and(ViewProjection::is_bare);
-    let count = cameras.iter().filter(is_bare).count();
-    (count > 0).then(|| {
-        let what = share(count, cameras);
-        format!(
-            "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
-        )
-    })
+    let what = share_of(cameras, is_bare)?;
+    Some(format!(
+        "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
+    ))
 }
 
 /// Orthographic matrices of which the near end is not certain.
 fn mirrored(_: &Scene, cameras: &[Camera]) -> Option<String> {
     // Depths from 0 are refused where it matters.
     let is_doubtful = |camera: &&Camera| camera.may_be_reversed() && camera.unprojected().is_ok();
-    let count = cameras.iter().filter(is_doubtful).count();
-    (count > 0).then(|| {
-        let what = share(count, cameras);
-        format!("{what} orthographic and mirrored; if depth is reversed, near and far are swapped")
-    })
+    let what = share_of(cameras, is_doubtful)?;
+    let found = format!("{what} orthographic and mirrored");
+    Some(found + "; if depth is reversed, near and far are swapped")
 }
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
@@ -306,14 +307,11 @@ fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
         let along = |row: &[f64; 4]| DVec3::from_slice(row).dot(camera.frame.forward());
         camera.lens.far().is_none() && (along(z) / along(w)).abs() < 0.5
     };
-    let count = cameras.iter().filter(is_shallow).count();
-    (count > 0).then(|| {
-        let what = share(count, cameras);
-        format!(
-            "{what} read without a far plane, as depth -1 is never reached; \
-             --matrix-convention column-d3d or row-d3d if depth is from 0 to 1"
-        )
-    })
+    let what = share_of(cameras, is_shallow)?;
+    Some(format!(
+        "{what} read without a far plane, as depth -1 is never reached; --matrix-convention \
+         column-d3d or row-d3d if depth is from 0 to 1"
+    ))
 }
 
 /// Matrices that are no camera's, and those whose transposes are.

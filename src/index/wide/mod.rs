@@ -49,6 +49,7 @@ const MOST_LEVELS: usize = 8;
 /// Level 0 are the items themselves, sixteen a block; lane `l` of block `b` on
 /// level `k` bounds block `16 b + l` of level `k - 1`, and with it the items
 /// from `(16 b + l) 16^k` on. 25.6 bytes of blocks, 4 of id and 0.13 of lanes an item.
+#[derive(Default)]
 pub struct Wide {
     blocks: Vec<BoxBlock>,
     /// The lanes of each leaf that hold an item.
@@ -136,12 +137,6 @@ fn unite(children: &[BoxBlock], parents: &mut [BoxBlock]) {
     }
 }
 
-impl Default for Wide {
-    fn default() -> Self {
-        Wide::unfilled(&[])
-    }
-}
-
 impl Wide {
     /// A tree over ids, [`ABSENT`] for a vacant lane; all boxes are empty.
     fn unfilled(ids: &[ItemId]) -> Wide {
@@ -152,9 +147,7 @@ impl Wide {
             ids: ids.into(),
             levels,
             vacant: ids.iter().filter(|&&id| id == ABSENT).count(),
-            root: Aabb::EMPTY,
-            positions: Positions::default(),
-            balls: None,
+            ..Wide::default()
         }
     }
 
