@@ -103,7 +103,7 @@ impl<'a> Run<'a> {
             bar: progress(left, ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
-            workers: Workers::new(stream.header.args.clone(), patience, folder.path())?,
+            workers: Workers::new(stream.header.args.clone(), patience, &folder.path)?,
             started: Instant::now(),
             told: Instant::now(),
             resumes: !stream.parts.is_empty(),
@@ -138,7 +138,7 @@ impl<'a> Run<'a> {
         let report = self.stream.report();
         if let Some(error) = failed {
             // A part of the cells makes no conclusion; what is on disk stays.
-            let _ = save_report(self.folder.path(), &report);
+            let _ = save_report(&self.folder.path, &report);
             return Err(error);
         }
         // Tables before files: where a file cannot be written, what was measured is seen.
@@ -147,8 +147,8 @@ impl<'a> Run<'a> {
         let why = || why().flat_map(|structure| run_why::blocks(&report, structure));
         blocks.extend(why());
         let shown = unread_is_fine(show(&blocks));
-        save_report(self.folder.path(), &report)?;
-        write_page(&report, self.folder.path(), why().collect())?;
+        save_report(&self.folder.path, &report)?;
+        write_page(&report, &self.folder.path, why().collect())?;
         let save = self.args.save.as_deref().filter(|_| !stopped);
         if let Some(name) = save {
             compare::save_baseline(name, &report)?;
@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
         shown?;
         unread_is_fine(self.close(&report, save))?;
         if stopped {
-            let (name, folder) = (program::name(), self.folder.path().display().to_string());
+            let (name, folder) = (program::name(), self.folder.path.display().to_string());
             let again = format!("{name} run --resume --out {}", text::quoted(&folder));
             tell!("interrupted: finished cells were saved; continue with {again}");
             return Ok(Ending::Interrupted);
@@ -285,7 +285,7 @@ impl<'a> Run<'a> {
             format!("{}: compare --baseline {name}", file.display())
         });
         let lines = warnings.chain(next(report, &self.stream.header.args, width));
-        close(&basis, lines, self.folder.path(), kept)
+        close(&basis, lines, &self.folder.path, kept)
     }
 }
 

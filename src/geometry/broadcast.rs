@@ -175,7 +175,7 @@ impl<'a, I: Isa> BallFrustum<'a, I> {
     /// `None` for other planes than those of a symmetric frustum with a far plane.
     #[inline(always)]
     pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
-        let sums = spheres.frustum()?;
+        let sums = spheres.frustum.as_ref()?;
         let [([f, r], t), ([g, s], u)] = sums.sides;
         Some(BallFrustum {
             spheres,

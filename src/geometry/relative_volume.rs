@@ -12,7 +12,8 @@ use super::{Aabb, ConvexVolume, Plane, VolumeError};
 /// `((nx*(x-ex) + ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
 #[derive(Clone, Debug)]
 pub struct RelativeVolume {
-    eye: Vec3,
+    /// The eye in f32 scene coordinates, which is subtracted from every box.
+    pub(crate) eye: Vec3,
     planes: ConvexVolume,
 }
 
@@ -45,12 +46,6 @@ impl RelativeVolume {
         RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
     }
 
-    /// The eye in f32 scene coordinates, which is subtracted from every box.
-    #[inline(always)]
-    pub fn eye(&self) -> Vec3 {
-        self.eye
-    }
-
     /// The planes about the eye.
     #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
@@ -77,8 +72,8 @@ mod tests {
         let about = ConvexVolume::from_planes(&[plane]).unwrap();
         let relative = RelativeVolume::new(eye, about).unwrap();
         let at = |x: f32| Aabb::new(eye + Vec3::X * x, eye + Vec3::X * x);
-        assert!(relative.planes().sees(&relative.moved(&at(1.0))));
-        assert!(!relative.planes().sees(&relative.moved(&at(-1.0))));
+        assert!(relative.planes.sees(&relative.moved(&at(1.0))));
+        assert!(!relative.planes.sees(&relative.moved(&at(-1.0))));
     }
 
     #[test]

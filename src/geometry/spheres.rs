@@ -164,7 +164,8 @@ impl SphereMargin {
 pub struct Spheres {
     planes: ConvexVolume,
     margins: [SphereMargin; MAX_PLANES],
-    frustum: Option<FrustumSums>,
+    /// All planes as sums, if they are those of a symmetric frustum with a far plane.
+    pub(super) frustum: Option<FrustumSums>,
 }
 
 impl Spheres {
@@ -181,12 +182,6 @@ impl Spheres {
         };
         spheres.frustum = FrustumSums::of(&spheres);
         spheres
-    }
-
-    /// All planes as sums, if they are those of a symmetric frustum with a far plane.
-    #[inline(always)]
-    pub(super) fn frustum(&self) -> Option<&FrustumSums> {
-        self.frustum.as_ref()
     }
 
     /// The planes in f32; what the sphere test adds to them is not in it.

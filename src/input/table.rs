@@ -24,7 +24,8 @@ pub struct TableReader<'b> {
     bytes: &'b [u8],
     csv: csv::Reader<&'b [u8]>,
     delimiter: u8,
-    header: Vec<String>,
+    /// The names of the columns, in order.
+    pub header: Vec<String>,
     header_line: u64,
     record: csv::StringRecord,
     /// Begin of the last record in bytes, and its line.
@@ -34,7 +35,8 @@ pub struct TableReader<'b> {
 /// One data row.
 pub struct Row<'a> {
     table: &'a TableReader<'a>,
-    line: u64,
+    /// Its line in the file, from 1.
+    pub line: u64,
 }
 
 impl<'b> TableReader<'b> {
@@ -120,11 +122,6 @@ impl<'b> TableReader<'b> {
         let to = at.min(self.bytes.len().saturating_sub(1));
         self.at = (at, line + lines(&self.bytes[last.min(to)..to]));
         self.at.1
-    }
-
-    /// The names of the columns, in order.
-    pub fn header(&self) -> &[String] {
-        &self.header
     }
 
     /// The place of a column, if the file has it.
@@ -226,11 +223,6 @@ impl Row<'_> {
             *number = self.finite_number(column)?;
         }
         Ok(numbers)
-    }
-
-    /// Its line in the file, from 1.
-    pub fn line(&self) -> u64 {
-        self.line
     }
 
     /// An error at this row.

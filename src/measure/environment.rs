@@ -12,7 +12,7 @@ use crate::scene::hex;
 use crate::shown::counted;
 
 /// The machine of a run; what the system does not tell is `None`.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Machine {
     /// Model name of the processor.
@@ -46,7 +46,7 @@ pub struct Cache {
 }
 
 /// Compiler and settings of the build; a fact that is not known is `None`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Toolchain {
     /// `rustc --version`.
@@ -66,7 +66,7 @@ pub struct Toolchain {
 }
 
 /// Source of the build.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Source {
     /// Version of this crate.

@@ -154,7 +154,7 @@ impl Entry<'_> {
             UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last build: {chose}")),
             _ => chose,
         };
-        let (refused, all) = (moving.refused, frames.motion.frames());
+        let (refused, all) = (moving.refused, frames.motion.frames);
         let built = format!("built again in {refused} of {all} frames, which it cannot refit");
         let notes = chose.into_iter().chain((refused > 0).then_some(built));
         self.part.chose = notes.reduce(|told, more| format!("{told}; {more}"));

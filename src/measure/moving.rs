@@ -57,9 +57,9 @@ impl<'w> Frames<'w> {
         let (scene, mut judging) = (workload.scene, Judging::default());
         let (mut boxes, mut shown) = (scene.items.to_vec(), motion.replay());
         let mut written = scene.originals.or_stored(boxes.len());
-        let due = spread(items.len(), MOST_JUDGED, motion.frames());
+        let due = spread(items.len(), MOST_JUDGED, motion.frames);
         let (mut due, views) = (due.enumerate().peekable(), workload.views_per_frame);
-        for frame in 0..motion.frames() {
+        for frame in 0..motion.frames {
             notice(None, "scanning the frames");
             advance(&mut replay, workload, &mut items);
             if due.peek().is_some() {
@@ -222,7 +222,7 @@ pub(super) fn replay(
     turn();
     let mut moving = Moving::build(frames, spec)?;
     let mut outs = vec![Vec::new(); frames.workload.views_per_frame];
-    let mut all = Vec::with_capacity(frames.motion.frames());
+    let mut all = Vec::with_capacity(frames.motion.frames);
     let all_threads = spec.is_threaded();
     let clock = Stopwatch::empty_lap(all_threads);
     // Memory of answers and traversals is no part of the first frame.
@@ -272,7 +272,7 @@ pub(super) fn ageing(
     notice(Some(&spec.label), "ageing");
     let mut ages = BTreeMap::new();
     let mut moving = Moving::build(frames, spec)?;
-    let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames());
+    let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames);
     for frame in 1..=last.unwrap_or(0) {
         moving.take_moves();
         notice(Some(&spec.label), "ageing");

@@ -64,7 +64,8 @@ const MOST_FRAMES: u64 = 100_000;
 pub struct Motion {
     /// The file or the spec, such as `drift:share=0.01`.
     pub name: String,
-    frames: usize,
+    /// Number of frames.
+    pub frames: usize,
     items: usize,
     source: Source,
 }
@@ -203,11 +204,6 @@ impl Motion {
             let what = format_args!("the last {} of {all} of '{path_name}'", cameras - seen);
             note(&format!("{frames}: {what} are not used"));
         }
-    }
-
-    /// Number of frames.
-    pub fn frames(&self) -> usize {
-        self.frames
     }
 
     /// Share of the items that move in a frame, mean.

@@ -162,7 +162,7 @@ pub(super) fn read_motion_csv(
         }
         rows.push((
             item(&row, id_at, scene)?,
-            row.line(),
+            row.line,
             bounds(&row, &bounds_at, scene)?,
         ));
     }

@@ -108,7 +108,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
             times.push(time);
         }
         let camera = read(row)?.map_err(|error| refused(row, &error))?;
-        Ok((row.line(), camera))
+        Ok((row.line, camera))
     })?
     .into_iter()
     .unzip();

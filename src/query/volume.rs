@@ -233,12 +233,12 @@ impl QueryVolume for ConvexVolumeF64 {
 impl QueryVolume for RelativeVolume {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        let moved = block.relative_to(self.eye());
+        let moved = block.relative_to(self.eye);
         moved.admitted_by(isa, self.planes(), mask)
     }
     #[inline(always)]
     fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
-        let moved = block.relative_to(self.eye());
+        let moved = block.relative_to(self.eye);
         moved.sorted_by(isa, self.planes(), mask)
     }
 }

@@ -24,7 +24,8 @@ use crate::shown::lines;
 
 /// The folder of a run that is being measured, locked against others.
 pub struct RunFolder {
-    path: PathBuf,
+    /// The folder that is written to.
+    pub path: PathBuf,
     /// Locked for as long as it is open.
     stream: File,
     samples: File,
@@ -78,11 +79,6 @@ impl RunFolder {
             self.samples.write_all(SAMPLE_COLUMNS.as_bytes())
         };
         write().map_err(writing::io(&self.path.join(SAMPLES)))
-    }
-
-    /// The folder that is written to.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Appends a line, whole or not at all as far as a reader can tell.

@@ -11,7 +11,7 @@ use crate::measure::{Machine, ReportCell, Source, Status, Toolchain, TwinEntry};
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// The contents of report.json: a run, what it ran on, and its cells.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     /// Raised when a field changes its meaning or goes away.

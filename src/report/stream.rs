@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::changes::{Fact, Setting, differences, facts, known};
 use super::ranking::unique;
 use super::surface::enter_growths;
-use super::{Noise, Report, RunInfo, SCHEMA_VERSION, SamplesRef};
+use super::{Report, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
 use crate::statistics::{geometric_mean, two_speeds};
@@ -32,7 +32,7 @@ pub enum Line<'l> {
 }
 
 /// Place, program and options of a run.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Header {
     /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the program that wrote it.
     pub schema_version: u32,
@@ -87,15 +87,12 @@ impl Header {
                 threads: threads.max().unwrap_or(1) as u32,
                 ..RunInfo::default()
             },
-            args: Vec::new(),
             machine,
             toolchain: Toolchain::capture(),
             source: Source::capture(),
             groups: plan.groups(),
-            whole: Vec::new(),
             structures: plan.structures.iter().map(|s| s.label.clone()).collect(),
-            binary: None,
-            files: BTreeMap::new(),
+            ..Header::default()
         }
     }
 
@@ -227,9 +224,7 @@ impl Stream {
             machine: header.machine.clone(),
             toolchain: header.toolchain.clone(),
             source: header.source.clone(),
-            noise: Noise::default(),
-            cells: Vec::new(),
-            bounds: Vec::new(),
+            ..Report::default()
         };
         let mut speeds = (0, 0);
         for key in &header.groups {

@@ -93,7 +93,7 @@ impl Rows {
 fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let columns = table.columns(&BOUNDS)?;
-    let others = table.header().iter().enumerate();
+    let others = table.header.iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));
     let labels = others.map(|(i, name)| (i, Labels::new(name)));
     let mut labels: Vec<(usize, Labels)> = labels.collect();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::geometry::Aabb;
 
 /// A node: the exact union of its items' bounds and the position of its subtree.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Default, Debug)]
 #[repr(C)]
 pub struct TreeNode {
     /// Exact union of its items' bounds; closed.

@@ -83,10 +83,8 @@ impl PackedTree {
                 Task::Open(group) => {
                     let node = tree.nodes.len();
                     tree.nodes.push(TreeNode {
-                        bounds: Aabb::EMPTY,
                         first: tree.ids.len() as u32,
-                        count: 0,
-                        after: 0,
+                        ..TreeNode::default()
                     });
                     tasks.push(Task::Close(node));
                     expand(&mut tree, node, group, &mut groups);

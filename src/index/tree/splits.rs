@@ -12,7 +12,7 @@ use crate::geometry::Plane;
 use crate::query::{Context, Predicate, Recorder};
 
 /// The direction of a node's plane and how far its two sides reach along it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Default, Debug)]
 pub struct Split {
     normal: Vec3,
     /// Nothing on the back side reaches farther than this along the normal.
@@ -24,16 +24,15 @@ pub struct Split {
 impl Split {
     /// The splits of a tree by the normal of each node; those of leaves are unused.
     pub fn all(tree: &PackedTree, normals: Vec<Vec3>) -> Vec<Split> {
-        let unfitted = |normal| Split {
-            normal,
-            back_high: 0.0,
-            front_low: 0.0,
-        };
-        let mut splits: Vec<Split> = normals.into_iter().map(unfitted).collect();
-        for (node, split) in splits.iter_mut().enumerate() {
+        let fitted = |(node, normal)| {
+            let mut split = Split {
+                normal,
+                ..Split::default()
+            };
             split.fit(tree, node);
-        }
-        splits
+            split
+        };
+        normals.into_iter().enumerate().map(fitted).collect()
     }
 
     /// Computes how far the two sides of a node reach, from the bounds of its children.
@@ -64,7 +63,7 @@ pub fn locate<C: Context>(
     p: Vec3,
     cx: &mut C,
 ) -> ControlFlow<()> {
-    let nodes = tree.nodes();
+    let nodes = &tree.nodes()[..];
     let mut open = Stack::new(0);
     while let Some(at) = open.pop() {
         let mut at = at as usize;
