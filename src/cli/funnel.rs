@@ -4,7 +4,7 @@
 
 use std::cell::Cell;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -33,10 +33,18 @@ use crate::spec::SpecError;
 use crate::visibility::{Guarantee, SampleGrid};
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
-    let outputs = [("--svg", &args.svg), ("--html", &args.html)];
+    expect_folder("--csv", args.csv.as_deref())?;
+    let folder = args.csv.as_ref().filter(|folder| folder.is_dir());
+    let tables: Vec<_> = TABLES
+        .lines()
+        .map(|line| Some(table_file(folder?, line)))
+        .collect();
+    let outputs = [("--svg", &args.svg), ("--html", &args.html)].into_iter();
+    let outputs: Vec<_> = outputs
+        .chain(tables.iter().map(|file| ("--csv", file)))
+        .collect();
     let inputs = [Path::new(&args.study.scene), args.study.path.as_ref()];
     expect_places(&outputs, &inputs)?;
-    expect_folder("--csv", args.csv.as_deref())?;
     let setting = setting(registry, args, None)?;
     let input = input(args, &setting)?;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
@@ -187,9 +195,15 @@ pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
             out.write_record(own.into_iter().chain(cells))?;
         }
         let text = String::from_utf8(out.into_inner()?)?;
-        write_text(&folder.join(format!("{table}.csv")), &text)?;
+        write_text(&table_file(folder, table), &text)?;
     }
     Ok(())
+}
+
+/// The file of a table, by its name or its line of [`TABLES`].
+fn table_file(folder: &Path, table: &str) -> PathBuf {
+    let name = table.split(':').next().unwrap_or_default();
+    folder.join(format!("{name}.csv"))
 }
 
 /// Items that each stage of the chain passes.

@@ -37,7 +37,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let mut motion = None;
     if let Some(source) = &args.motion {
         let own = Motion::load(source, &scene)?.seen_by(&cameras, 1);
-        let (frames, name) = (own.frames(), &own.name);
+        let (frames, name) = (own.frames, &own.name);
         let wanted = args.frame.map_or(frames, |frame| frame as usize);
         anyhow::ensure!(
             wanted <= frames,

@@ -2,8 +2,9 @@
 
 use super::unfit;
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions};
+use crate::geometry::Aabb;
 use crate::input::Result;
-use crate::scene::Scene;
+use crate::scene::{Scene, mix64};
 use crate::shown::significant;
 
 /// Maximum numbers of items and cameras sampled per step of the search.
@@ -29,6 +30,9 @@ const LEAST_DEPTH: f64 = 1.01;
 /// Three items instead of two.
 const MOST_ABOVE: f64 = 1.5;
 
+/// Largest ratio, either way, of the shares that two samples of the items find.
+const MOST_APART: f64 = 1.2;
+
 /// The scale of far at which `share` of the items is visible on average.
 ///
 /// Within the sample's accuracy. A near that is a thousandth of far is scaled with it.
@@ -50,10 +54,11 @@ pub(super) fn for_visible_share(
     let watched = cameras.len().clamp(1, MOST_CAMERAS);
     let by_all = (SEEN_BY_ALL / share / watched as f64).ceil() as usize;
     let needed = needed.max(by_all.min(MOST_TESTS / watched));
-    let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
-    let sample = every_nth(cameras, most_cameras(items.len()));
+    let most = MOST_ITEMS.max(needed);
+    let regular = every_nth(&scene.items, most);
+    let sample = every_nth(cameras, most_cameras(regular.len()));
     let around = scene.surroundings();
-    let visible = |scale: f64| -> Result<f64> {
+    let visible = |items: &[Aabb], scale: f64| -> Result<f64> {
         let mut seen = 0;
         for camera in &sample {
             let scaled = rescaled(camera, scale);
@@ -69,31 +74,55 @@ pub(super) fn for_visible_share(
             format!("six planes return {found} of '{scene}' along it; expected a {wanted} share");
         unfit(path, reason)
     };
-    let (mut low, mut high) = (1e-4, 4.0);
-    let most = visible(high)?;
-    if most < share {
-        let found = format!("at most {}%", significant(most * 100.0));
-        return Err(unreached(&found, "smaller"));
-    }
-    let mut reached = [visible(low)?, most];
-    for _ in 0..16 {
-        let middle = f64::sqrt(low * high);
-        let found = visible(middle)?;
-        if found < share {
-            (low, reached[0]) = (middle, found);
-        } else {
-            (high, reached[1]) = (middle, found);
+    let search = |items: &[Aabb]| {
+        let mut low = 1e-4;
+        // A near that grows with far loses what is close, so a smaller scale may show more.
+        let (mut high, mut most, mut largest) = (4.0, visible(items, 4.0)?, 0.0);
+        while most < share && high > 4.0 * low {
+            (high, largest) = (high / 4.0, most.max(largest));
+            most = visible(items, high)?;
         }
+        if most < share {
+            let found = format!("at most {}%", significant(largest * 100.0));
+            return Err(unreached(&found, "smaller"));
+        }
+        let mut reached = [visible(items, low)?, most];
+        for _ in 0..16 {
+            let middle = f64::sqrt(low * high);
+            let found = visible(items, middle)?;
+            if found < share {
+                (low, reached[0]) = (middle, found);
+            } else {
+                (high, reached[1]) = (middle, found);
+            }
+        }
+        if reached[1] > share * MOST_ABOVE {
+            let [below, above] = reached.map(|share| significant(share * 100.0));
+            let found = match reached[0] < share {
+                true => format!("{below}% or {above}%, and no share between,"),
+                false => format!("at least {above}%"),
+            };
+            return Err(unreached(&found, "larger"));
+        }
+        Ok(high)
+    };
+    let found = search(&regular);
+    // Files that repeat themselves may have one kind of item at every n-th place.
+    let scattered = scattered(&scene.items, regular.len());
+    let share_of = |scale: &f64| visible(&scattered, *scale).ok();
+    match found.as_ref().ok().and_then(share_of) {
+        Some(seen) if (share / MOST_APART..=share * MOST_APART).contains(&seen) => found,
+        _ => search(&scattered),
     }
-    if reached[1] > share * MOST_ABOVE {
-        let [below, above] = reached.map(|share| significant(share * 100.0));
-        let found = match reached[0] < share {
-            true => format!("{below}% or {above}%, and no share between,"),
-            false => format!("at least {above}%"),
-        };
-        return Err(unreached(&found, "larger"));
-    }
-    Ok(high)
+}
+
+/// `count` of the items, each from a hashed place in an equal part of them.
+fn scattered(items: &[Aabb], count: usize) -> Vec<Aabb> {
+    let place = |part: usize| {
+        let [begin, end] = [part, part + 1].map(|part| part * items.len() / count);
+        items[begin + mix64(part as u64) as usize % (end - begin)]
+    };
+    (0..count).map(place).collect()
 }
 
 /// Most cameras of a sample with that many items.

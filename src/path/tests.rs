@@ -108,6 +108,39 @@ fn a_visible_share_can_be_asked_for() {
     }
 }
 
+/// Every fourth item stands in the middle; the others are all around.
+#[test]
+fn a_visible_share_holds_where_the_order_of_items_repeats() {
+    let mut rng = SeededRng::new(5);
+    let boxes = (0..32_000).map(|i| {
+        let centre = (rng.point() - 0.5) * if i % 4 == 0 { 100.0 } else { 1000.0 };
+        WorldBox::new(centre, centre + 1.0)
+    });
+    let scene = Scene::from_boxes("b", &boxes.collect::<Vec<_>>()).unwrap();
+    for (source, wanted) in [
+        ("flythrough:visible=10%", 0.1),
+        ("flythrough:visible=2%", 0.02),
+    ] {
+        let share = visible_share(&path(source, &scene), &scene);
+        assert!((share / wanted - 1.0).abs() < 0.2, "{source}: {share}");
+    }
+}
+
+/// Two items far off make the scene large; a near that grows with far loses the dense rest.
+#[test]
+fn a_share_that_only_a_nearer_far_plane_reaches_is_found() {
+    let mut rng = SeededRng::new(5);
+    let dense = (0..1_000).map(|_| rng.point() * 2.0 - 1.0);
+    let dense = dense.map(|at| WorldBox::new(at, at + 0.02));
+    let far_off = [-500.0, 500.0].map(DVec3::splat);
+    let far_off = far_off.map(|at| WorldBox::new(at, at + 1.0));
+    let boxes: Vec<_> = dense.chain(far_off).collect();
+    let scene = Scene::from_boxes("b", &boxes).unwrap();
+    let path = path("orbit:radius=0.00001,frames=16,visible=5%", &scene);
+    let share = visible_share(&path, &scene);
+    assert!((share / 0.05 - 1.0).abs() < 0.2, "{share}");
+}
+
 #[test]
 fn a_near_that_was_asked_for_stays_beside_a_visible_share() {
     let scene = scene("uniform:n=5000");

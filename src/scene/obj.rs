@@ -170,8 +170,12 @@ impl Obj<'_> {
                 let name = String::from_utf8_lossy(&line[start..end.unwrap_or(line.len())]);
                 let plain = |line: &str| line.trim().trim_end_matches('\\').trim().to_owned();
                 let lines: Vec<String> = name.lines().map(plain).collect();
-                let name = lines.join(" ").trim().to_owned();
-                self.items.pop_if(|(_, first)| *first == self.corners.len());
+                let mut name = lines.join(" ").trim().to_owned();
+                let unused = self.items.pop_if(|(_, first)| *first == self.corners.len());
+                // A group without a name is a part of the object before it.
+                if name.is_empty() {
+                    name = unused.unwrap_or_default().0;
+                }
                 self.items.push((name, self.corners.len()));
             }
             _ if word.contains(&0) => {
@@ -301,6 +305,14 @@ f 1 2 3 4";
             let held = surfaces.bounds(item);
             assert!(b.min.cmple(held.min).all() && b.max.cmpge(held.max).all());
         }
+    }
+
+    #[test]
+    fn a_group_without_a_name_is_of_the_object_before_it() {
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\no house\ng\nf 1 2 3\ng\nf 1 3 2\n";
+        let scene = read(text.as_bytes()).unwrap();
+        let names = [0, 1].map(|item| scene.labels[0].get(item).to_owned());
+        assert_eq!(names, ["house", ""]);
     }
 
     #[test]

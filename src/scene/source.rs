@@ -322,7 +322,7 @@ pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let (name, expected) = match by_name.or(by_start) {
         Some(row) => (row.0, row.3),
         None if stl() => ("STL", MESH),
-        None if is_json && holds(b"\"geometricError\"") => ("3D Tiles", TILES),
+        None if is_json && !is_named("gltf") && holds(b"\"geometricError\"") => ("3D Tiles", TILES),
         None if is_json && !is_named("gltf") && !holds(b"\"asset\"") => {
             ("JSON without the 'asset' of glTF", PICTURE)
         }

@@ -262,10 +262,22 @@ impl File<'_> {
             if item.world.matrix3.determinant() < 0.0 {
                 corners.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
-            surfaces.push_written(&world(item), &corners);
+            let points = world(item);
+            for &point in &points {
+                self.within(point, item)?;
+            }
+            surfaces.push_written(&points, &corners);
             surfaces.set_last(&mesh.kinds, &mesh.two_sided);
         }
         surfaces.into_scene(name)
+    }
+
+    /// Checks that the transform of an item leaves a point among the finite numbers.
+    fn within(&self, point: DVec3, item: &Placed) -> Result<()> {
+        let place = || format!("meshes[{}]", item.mesh);
+        let found = || format!("a vertex that its transforms move to {point}");
+        let error = || self.error(place(), found(), "finite numbers");
+        point.is_finite().then_some(()).ok_or_else(error)
     }
 
     /// World box of the bounds that the accessors of an item state.
@@ -288,12 +300,13 @@ impl File<'_> {
                 let expected = "min <= max of three numbers each";
                 self.error(place, "no bounds of positions", expected)
             })?;
-            let corners = (0..8).map(|i| {
+            for i in 0..8 {
                 let is_low = BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
                 let corner = DVec3::select(is_low, min, max);
-                WorldBox::at(item.world.transform_point3(corner))
-            });
-            all = WorldBox::union_of(corners.chain([all]));
+                let corner = item.world.transform_point3(corner);
+                self.within(corner, item)?;
+                all = WorldBox::union_of([all, WorldBox::at(corner)]);
+            }
         }
         Ok(all)
     }

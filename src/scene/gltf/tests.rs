@@ -186,6 +186,24 @@ fn transforms_are_those_of_the_file_in_f64() {
 }
 
 #[test]
+fn transforms_that_leave_no_number_are_refused() {
+    let column = [1.5e308, 0.0, 0.0, 0.0, -1.5e308, 1.0, 0.0, 0.0];
+    let matrix = [&column[..], &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]].concat();
+    let mut file = file();
+    file["nodes"] = json!([{"mesh": 0, "matrix": matrix}]);
+    file["scenes"] = json!([{"nodes": [0]}]);
+    let refused = |file: &Value, wanted: &str| {
+        let error = read(file).map(|_| ()).unwrap_err().to_string();
+        let wanted = format!("meshes[0]: a vertex that its transforms move to {wanted}");
+        assert!(error.contains(&wanted), "{error}");
+    };
+    refused(&file, "[inf, 0, 0]; expected finite numbers");
+    // From the bounds alone.
+    file["meshes"][0]["primitives"][0]["mode"] = json!(0);
+    refused(&file, "[NaN, 2, 0]");
+}
+
+#[test]
 fn points_without_a_triangle_are_not_copied() {
     let mut file = file();
     file["accessors"][1]["count"] = json!(3);
