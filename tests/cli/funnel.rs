@@ -377,7 +377,19 @@ fn stages_can_be_chosen_and_left_out() {
 #[test]
 fn what_cannot_be_is_refused_in_a_line() {
     let folder = folder();
+    let tables = folder.path().join("tables");
+    fs::create_dir(&tables).unwrap();
+    let scene = fs::read(folder.path().join("scene.csv")).unwrap();
+    fs::write(tables.join("level.csv"), &scene).unwrap();
+    let line = "funnel --scene tables/level.csv --path orbit:frames=1 --csv tables";
+    let done = cullbench(folder.path(), line);
+    assert_refused(&done, "level.csv | an input | --csv", line);
+    assert_eq!(fs::read(tables.join("level.csv")).unwrap(), scene);
     for (more, wanted) in [
+        (
+            "--csv tables --svg tables/stages.csv",
+            "stages.csv | another output",
+        ),
         ("--occlusion maskd", "maskd | did you mean 'masked'"),
         ("--region portal-rect", "portal-rect"),
         ("--samples 0x4", "--samples | 0x4 | columns x rows"),
