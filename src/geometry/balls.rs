@@ -6,7 +6,7 @@
 use std::hint::cold_path;
 
 use super::{Aabb, Ball, BoxBlock, LANES, LaneMask, PlaneMask, Spheres};
-use crate::kernel::{Isa, prefetch};
+use crate::kernel::{Isa, Piece, prefetch};
 
 /// Sixteen spheres as four rows: centre x, y, z, radius. 256 bytes.
 #[derive(Clone, Copy, Default, Debug)]
@@ -120,10 +120,9 @@ pub(super) fn decide<'s, I: Isa>(
     if possible == sure {
         return sure;
     }
-    // Else a loop may keep its planes in memory instead of registers, for the sake of the call.
     cold_path();
     let (spheres, mask, block) = question();
-    sure | spheres.settled(block, mask, possible & !sure)
+    sure | possible & settled(isa, Doubtful(spheres, mask, block))
 }
 
 impl Balls<'_> {
@@ -189,17 +188,26 @@ impl Spheres {
             (self, mask, block)
         })
     }
+}
 
-    /// Those of the lanes that no plane of the mask drops, one by one.
-    #[cold]
-    #[inline(never)]
-    fn settled(&self, block: &BoxBlock, mask: PlaneMask, lanes: LaneMask) -> LaneMask {
-        let keeps = |lane: usize| {
-            let cube = block.get(lane);
-            lanes >> lane & 1 == 1 && !(0..32).any(|i| mask >> i & 1 == 1 && self.drops(i, &cube))
-        };
-        (0..LANES).fold(0, |kept, lane| kept | LaneMask::from(keeps(lane)) << lane)
+/// Bounds that spheres leave in doubt, as far planes or items make many: in vectors, and
+/// apart, or a loop may keep its planes in memory for their sake.
+struct Doubtful<'s>(&'s Spheres, PlaneMask, &'s BoxBlock);
+
+impl<I: Isa> Piece<I> for Doubtful<'_> {
+    type Output = LaneMask;
+
+    #[inline(always)]
+    fn run(self, isa: I) -> LaneMask {
+        let Doubtful(spheres, mask, block) = self;
+        spheres.kept_boxes(isa, block, mask)
     }
+}
+
+#[cold]
+#[inline(never)]
+fn settled<I: Isa>(isa: I, doubtful: Doubtful) -> LaneMask {
+    isa.apart(doubtful)
 }
 
 #[cfg(test)]
