@@ -3,6 +3,8 @@
 //! A camera on a spring behind a target that is known where frames end, and moves on a
 //! straight line in between.
 
+use crate::kernel::each;
+
 /// Position and velocity.
 pub type State = [f64; 2];
 
@@ -190,7 +192,7 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, order, step }
     "implicit-midpoint", "by the values in the middle of the step; A-stable, but rings when stiff", 2,
         |arm, line, t, y, h| {
             let middle = arm.stage(line.at(t + h / 2.0), y, h / 2.0);
-            [0, 1].map(|i| 2.0 * middle[i] - y[i])
+            each([0, 1], |i| 2.0 * middle[i] - y[i])
         };
     "exact-linear", "the closed form for a target on a straight line between frames", 1, chased;
 };
@@ -231,7 +233,7 @@ impl Arm {
         let b = self.slope(target(t + half), along(y, half, a));
         let c = self.slope(target(t + half), along(y, half, b));
         let d = self.slope(target(t + h), along(y, h, c));
-        let sum = [0, 1].map(|i| a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+        let sum = each([0, 1], |i| a[i] + 2.0 * (b[i] + c[i]) + d[i]);
         along(y, h / 6.0, sum)
     }
 
@@ -240,7 +242,7 @@ impl Arm {
         let mut y = base;
         for _ in 0..MOST_ITERATIONS {
             let slope = self.slope(target, y);
-            let [dx, dv] = [0, 1].map(|i| base[i] + g * slope[i] - y[i]);
+            let [dx, dv] = each([0, 1], |i| base[i] + g * slope[i] - y[i]);
             let stretch = target - y[0];
             let tangent = 1.0 + 3.0 * self.stiffening * stretch * stretch;
             let k = self.stiffness * tangent;

@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3, Quat, Vec3};
 use single::{DEGREE, LEVEL, sin_cos, turned, wide};
 
 use crate::camera::{self, look_at};
+use crate::kernel::each;
 use crate::measure::TimedTask;
 
 /// Yaw, pitch and roll of every step, in degrees about the camera's own axes.
@@ -93,7 +94,7 @@ macro_rules! precision {
             /// `camera::controls`, inlined as those are.
             #[inline(always)]
             pub fn turned([mut u, mut v, mut n]: [$vector; 3], by: [$real; 3]) -> [$vector; 3] {
-                let [(sin, cos), pitch, roll] = by.map(sin_cos);
+                let [(sin, cos), pitch, roll] = each(by, sin_cos);
                 (n, u) = (n * cos + u * sin, u * cos - n * sin);
                 let (sin, cos) = pitch;
                 (v, n) = (v * cos + n * sin, n * cos - v * sin);
@@ -106,7 +107,7 @@ macro_rules! precision {
             /// mouse, and takes their sines and cosines.
             pub fn frame<const CORRECTION: u8>(looks: RangeInclusive<u64>) -> Vec<DMat3> {
                 let step = |(axes, rotations): &mut ([$vector; 3], u32), turn: &Turn| {
-                    *axes = turned(*axes, turn.map(|angle| angle as $real * DEGREE));
+                    *axes = turned(*axes, each(*turn, |angle| angle as $real * DEGREE));
                     if CORRECTION == GRAM_SCHMIDT {
                         let [u, _, n] = *axes;
                         let n = n.normalize();
@@ -136,7 +137,7 @@ precision!(double, f64, DVec3, DMat3, libm::sin, libm::cos);
 /// An f32 quaternion that is multiplied by the step's.
 pub fn quaternion(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |q: &mut Quat, turn: &Turn| {
-        let half = turn.map(|angle| sin_cos(angle as f32 * DEGREE * 0.5));
+        let half = each(*turn, |angle| sin_cos(angle as f32 * DEGREE * 0.5));
         let yaw = Quat::from_xyzw(0.0, half[0].0, 0.0, half[0].1);
         let pitch = Quat::from_xyzw(half[1].0, 0.0, 0.0, half[1].1);
         let roll = Quat::from_xyzw(0.0, 0.0, half[2].0, half[2].1);
@@ -149,7 +150,7 @@ pub fn quaternion(looks: RangeInclusive<u64>) -> Vec<DMat3> {
 /// Sums of f32 angles in radians, and the axes that follow from them.
 pub fn radians(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |(sums, axes): &mut ([f32; 3], [Vec3; 3]), turn: &Turn| {
-        *sums = [0, 1, 2].map(|k| sums[k] + turn[k] as f32 * DEGREE);
+        *sums = each([0, 1, 2], |k| sums[k] + turn[k] as f32 * DEGREE);
         *axes = turned(LEVEL, *sums);
     };
     let axes = |(_, axes): &([f32; 3], [Vec3; 3])| wide(*axes);
