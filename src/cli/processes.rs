@@ -373,7 +373,7 @@ fn processors() -> Vec<usize> {
 
 /// Raised when requests or messages change: programs of different versions do
 /// not understand each other.
-pub const PROTOCOL: u32 = 6;
+pub const PROTOCOL: u32 = 7;
 
 /// Work of one process.
 #[derive(Clone, Serialize, Deserialize)]

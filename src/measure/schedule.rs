@@ -42,6 +42,10 @@ pub struct Protocol {
 pub const CLOCK_NS: f64 = 650.0;
 /// Largest share of a lap that the clock may take.
 pub const MOST_OVERHEAD: f64 = 0.01;
+/// Least time of a lap, ns: what a clock reading costs beyond an empty lap is up to a
+/// hundredth of it. Longer ones are not made of repeated cameras, which a branch
+/// predictor learns.
+const LEAST_LAP_NS: f64 = 5_000.0;
 /// Most cameras of a cold pass, where each query costs a sweep over memory.
 const COLD_CAMERAS: usize = 24;
 /// Fewest cameras that are timed, so that a path is more than one view.
@@ -67,7 +71,7 @@ pub struct Schedule {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TaskPlan {
-    /// Queries per clock reading.
+    /// Queries per clock reading; more than cameras where each is asked several times.
     pub batch: u32,
     /// Takes part in every so many-th round: slow tasks in fewer.
     pub every: u32,
@@ -112,7 +116,7 @@ impl Schedule {
                 (None, true) => 1,
                 (None, false) => batch(task.least_ns.unwrap_or(pilot), timed),
             };
-            let pass = 2.0 * (pilot * timed as f64).max(1.0);
+            let pass = 2.0 * (pilot * timed.max(batch) as f64).max(1.0);
             let rounds = match protocol.cold {
                 true => least,
                 false => ((protocol.task_ns / pass) as usize).clamp(least, most.max(least)),
@@ -175,10 +179,13 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     (middle - CLOCK_NS).max(middle / 8.0).max(1.0)
 }
 
-/// Queries per clock reading: a power of two that makes the clock negligible.
+/// Queries per clock reading: a power of two that makes the clock negligible, or all
+/// cameras, several times where they take less than [`LEAST_LAP_NS`].
 fn batch(query_ns: f64, cameras: usize) -> usize {
-    let needed = (CLOCK_NS / (MOST_OVERHEAD * query_ns.max(1.0))).ceil();
-    (needed.max(1.0) as usize).next_power_of_two().min(cameras)
+    let queries = |ns: f64| (ns / query_ns.max(1.0)).ceil() as usize;
+    let needed = queries(CLOCK_NS / MOST_OVERHEAD).next_power_of_two();
+    let passes = queries(LEAST_LAP_NS).div_ceil(cameras);
+    needed.min(cameras.saturating_mul(passes))
 }
 
 /// A schedule with the keys of its tasks.
@@ -313,7 +320,9 @@ mod tests {
             assert!(CLOCK_NS <= MOST_OVERHEAD * batch * ns, "{ns}");
             assert!(batch == 1.0 || CLOCK_NS > MOST_OVERHEAD * batch / 2.0 * ns);
         }
-        assert_eq!(batch(1.0, 40), 40);
+        // The cameras once, or as often as the least lap takes.
+        assert_eq!(batch(200.0, 40), 40);
+        assert_eq!((batch(20.0, 40), batch(20.0, 1)), (280, 250));
     }
 
     #[test]
