@@ -60,7 +60,11 @@ impl CompareTable<'_> {
 
     /// The verdict, the counts and the worst cell, in a sentence.
     fn summary(&self) -> String {
+        let outcomes = self.changes.rows.iter().map(|row| row.outcome);
+        let mut judged = outcomes.filter(|outcome| outcome.is_judged()).peekable();
+        let is_open = judged.peek().is_some() && judged.all(|o| o == Outcome::Inconclusive);
         let verdict = match self.verdict().1 {
+            "ok" if is_open => "nothing was decided".to_owned(),
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };
@@ -440,7 +444,10 @@ pub fn counted(cells: &[Lone]) -> String {
 
 /// How many cells only one side has; each that is wrong by its name.
 fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
-    let all = (!cells.is_empty()).then(|| format!("only in {side}: {}", counted(cells)));
+    let all = (!cells.is_empty()).then(|| {
+        let company = "beside which the others may take other times";
+        format!("only in {side}: {}, {company}", counted(cells))
+    });
     let wrong = cells.iter().filter(|cell| cell.status.is_failure());
     let wrong = wrong.map(|cell| {
         let (name, status) = (name(&cell.cell), cell.status.name());

@@ -354,11 +354,22 @@ impl Workers {
 
 /// This very program; on Linux also when another has taken its place.
 fn own_program() -> anyhow::Result<PathBuf> {
-    let running = PathBuf::from("/proc/self/exe");
-    if cfg!(target_os = "linux") && running.exists() {
-        return Ok(running);
+    let named = std::env::current_exe();
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let running = PathBuf::from("/proc/self/exe");
+        let file = |path: &Path| path.metadata().ok().map(|file| (file.dev(), file.ino()));
+        let held = file(&running);
+        // Under an emulator, such as valgrind, what runs is another program than the named.
+        let is_emulated = named
+            .as_ref()
+            .is_ok_and(|own| own.exists() && file(own) != held);
+        if held.is_some() && !is_emulated {
+            return Ok(running);
+        }
     }
-    std::env::current_exe().context("this program cannot be found again")
+    named.context("this program cannot be found again")
 }
 
 /// The processors that this process may run on; empty where that is not known.

@@ -7,7 +7,7 @@ use std::collections::HashSet;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
-use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z};
+use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z, default_test};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, count_items};
@@ -142,10 +142,17 @@ impl<'w> FragmentStage<'w> {
         }
     }
 
-    /// No test, and those that are drawn.
+    /// No test, and those that are drawn: compared rows, and the test that others are
+    /// measured against.
     fn tests(&self) -> impl Iterator<Item = BackEnd> {
-        let rows = self.world.back_ends(StageKind::Fragment).into_iter();
-        rows.filter(|row| row.name == NONE || self.too_much.is_none())
+        let world = self.world;
+        let compared = world.rows(StageKind::Fragment);
+        let default = default_test(world.cut_outs.is_some());
+        let is_drawn = move |row: &BackEnd| {
+            row.name == default || compared.iter().any(|(own, _)| own.name == row.name)
+        };
+        let rows = world.back_ends(StageKind::Fragment).into_iter();
+        rows.filter(move |row| row.name == NONE || self.too_much.is_none() && is_drawn(row))
     }
 
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {

@@ -17,15 +17,15 @@ use crate::visibility::region::{IdSet, Scratch};
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
-    /// A back end of a stage of whole items.
+    /// A back end of a stage of whole items, behind some steps.
     ///
     /// # Panics
     /// If there is no such back end.
-    pub fn run(&self, stage: StageKind, name: &str) -> Run<'_> {
+    pub fn run(&self, stage: StageKind, name: &str, before: &[Step]) -> Run<'_> {
         match stage {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
-            StageKind::Occlusion => self.run_occlusion(name),
+            StageKind::Occlusion => self.run_occlusion(name, before),
             StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
         }
     }
@@ -60,18 +60,19 @@ impl World<'_> {
         })
     }
 
-    fn run_occlusion(&self, name: &str) -> Run<'_> {
+    fn run_occlusion(&self, name: &str, before: &[Step]) -> Run<'_> {
         let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
         let row = row.expect("a row of the occlusion stage");
         let occlude = RefCell::new((row.build)(self.samples, self.kernel));
         let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
+        // A traversal of the whole scene ignores the visible regions.
+        let by_region = before.iter().any(|(stage, _)| *stage == StageKind::Region);
         Box::new(move |view, input, out| {
             let occluders = occluders[view];
             let View { rays, volume, .. } = &self.views[view];
             let view = occlusion::View::new(rays, volume, occluders, self.samples);
             (occlude.borrow_mut())(occluders, &view, out);
-            // A traversal of the whole scene ignores the visible regions.
-            if let (Some(items), true) = (input, self.regions.is_some()) {
+            if let (Some(items), true) = (input, by_region) {
                 out.retain(|id| items.binary_search(id).is_ok());
             }
         })
@@ -122,7 +123,7 @@ impl<'w> ItemStages<'w> {
             return;
         }
         self.run(before);
-        let run = self.world.run(*stage, name);
+        let run = self.world.run(*stage, name, before);
         let output = self.world.views().map(|view| {
             let mut ids = Vec::new();
             run(view, self.items(before, view), &mut ids);
@@ -178,9 +179,9 @@ impl<'w> ItemStages<'w> {
     /// Every step that was run.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.left.iter().map(|(steps, _)| {
-            let (stage, name) = steps.last().expect("at least one step");
-            let run = self.world.run(*stage, name);
-            let input = self.behind(&steps[..steps.len() - 1]);
+            let ((stage, name), before) = steps.split_last().expect("at least one step");
+            let run = self.world.run(*stage, name, before);
+            let input = self.behind(before);
             let ask: Ask = Box::new(move |view, out| {
                 run(view, input.map(|left| &left[view][..]), out);
             });

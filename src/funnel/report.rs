@@ -134,11 +134,11 @@ impl StageRow {
         let errors = &self.errors;
         (errors.false_negative_count > 0.0).then(|| {
             format!(
-                "{} {} drops {:.2} visible items per view; the largest covers {} samples.",
+                "{} {} drops {} visible items per view; the largest covers {}.",
                 self.back_end.stage.name(),
                 self.back_end.name,
-                errors.false_negative_count,
-                errors.worst_missing_samples
+                significant(errors.false_negative_count),
+                counted(errors.worst_missing_samples as usize, "sample")
             )
         })
     }

@@ -433,7 +433,7 @@ mod tests {
         let views = (3, SampleGrid::new(8, 5));
         let input = FunnelInput::new(&setting, chain, views, Execution::default());
         let world = World::new(&input, &|_| ()).expect("a world");
-        let run = |stage, name| world.run(stage, name);
+        let run = |stage, name| world.run(stage, name, &[]);
         let mut found = 0;
         for view in world.views() {
             let (mut left, mut right, mut none) = (Vec::new(), Vec::new(), Vec::new());

@@ -82,7 +82,7 @@ pub struct CellTimes {
     pub cameras_checked: usize,
     /// Queries per clock reading.
     pub batch: usize,
-    /// Time in each process, ns, by metric.
+    /// Time in each process by metric, in the metric's unit.
     pub by_process: BTreeMap<String, Vec<f64>>,
 }
 

@@ -96,7 +96,9 @@ pub fn compare(folder: &Path, options: &str, code: i32) -> String {
 /// Counts of the last sentence: "1 slower, .. of 10 cells".
 pub fn last_line(text: &str) -> String {
     let text = unwrapped(text.trim_end());
-    let (_, verdict) = text.rsplit_once("egression").unwrap_or(("", &text));
+    let heads = ["egression", "was decided"].into_iter();
+    let mut ends = heads.filter_map(|head| text.rsplit_once(head));
+    let (_, verdict) = ends.next().unwrap_or(("", &text));
     let (_, counts) = verdict.split_once(": ").unwrap_or(("", verdict));
     counts
         .split("; worst")
@@ -211,6 +213,7 @@ fn one_process_and_few_structures_are_inconclusive() {
     for wanted in [
         "0 slower, 10 inconclusive",
         "10 processes vs 1 process,",
+        "Nothing was decided",
         "10 inconclusive: ",
         "finer runs, perhaps with --processes 20,",
         "compare --against BINARY",
