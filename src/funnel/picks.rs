@@ -11,6 +11,8 @@ use serde::Serialize;
 use super::error::LeftOutRow;
 use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
+use crate::camera::Surroundings;
+use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
@@ -62,12 +64,15 @@ impl PickRow {
 }
 
 /// Appends the answer at a cursor of a view.
-type Answer<'w> = Box<dyn Fn(&Rays, &Cursor, &mut Vec<ItemId>) + 'w>;
+type Answer<'w> = Box<dyn Fn(&Cursor, &mut Vec<ItemId>) + 'w>;
 
 /// A ray and a rectangle of the image.
 struct Cursor {
     ray: Ray,
     rectangle: CursorRectangle,
+    /// Frustum of the rectangle; `None` where f64 cannot tell it from a point, which
+    /// holds nothing.
+    volume: Option<ConvexVolume>,
 }
 
 /// Every back end with its row, and the cursors of every view.
@@ -82,7 +87,8 @@ pub struct Picks<'w> {
 impl<'w> Picks<'w> {
     /// Builds every back end but loops over too many bodies.
     pub fn new(world: &'w World<'w>) -> Picks<'w> {
-        let of_view = |view| cursors(world.rays(view), world.samples);
+        let around = world.scene.surroundings();
+        let of_view = |view| cursors(world.rays(view), world.samples, &around);
         let mut picks = Picks {
             world,
             pickers: Vec::new(),
@@ -117,10 +123,10 @@ impl<'w> Picks<'w> {
                 ..PickRow::default()
             };
             let same = pick.clone();
-            let first: Answer = Box::new(move |_, cursor, out| {
+            let first: Answer = Box::new(move |cursor, out| {
                 out.extend(pick.first(&cursor.ray));
             });
-            let nearest: Answer = Box::new(move |_, cursor, out| {
+            let nearest: Answer = Box::new(move |cursor, out| {
                 same.nearest(&cursor.ray, NEAREST, out);
             });
             let first = (declared(PickQuestion::First), first);
@@ -139,11 +145,9 @@ impl<'w> Picks<'w> {
                 self.left_out.push(row);
                 continue;
             }
-            let around = world.scene.surroundings();
-            let through: Answer = Box::new(move |rays, cursor, out| {
-                // A rectangle that f64 cannot tell from a point holds nothing.
-                if let Ok(volume) = cursor.rectangle.volume(rays, &around) {
-                    index.visible(&volume, out);
+            let through: Answer = Box::new(move |cursor, out| {
+                if let Some(volume) = &cursor.volume {
+                    index.visible(volume, out);
                 }
             });
             let declared = PickRow {
@@ -162,7 +166,7 @@ impl<'w> Picks<'w> {
         self.pickers.iter().map(move |(row, answer)| {
             let ask: Ask = Box::new(move |view, out| {
                 for cursor in &self.cursors[view] {
-                    answer(self.world.rays(view), cursor, out);
+                    answer(cursor, out);
                 }
             });
             (row.key(), ask)
@@ -189,7 +193,7 @@ impl<'w> Picks<'w> {
                 let truth = self.truth(&*exact, rays, cursor);
                 for (row, (_, answer)) in rows.iter_mut().zip(&self.pickers) {
                     found.clear();
-                    answer(rays, cursor, &mut found);
+                    answer(cursor, &mut found);
                     row.ray_count += 1;
                     row.wrong_count += usize::from(!truth.agrees(row.question, &mut found));
                 }
@@ -201,8 +205,7 @@ impl<'w> Picks<'w> {
     fn truth(&self, exact: &dyn Pick, rays: &Rays, cursor: &Cursor) -> Truth {
         let scene = self.world.scene;
         let is_small = scene.items.len() <= MOST_FOR_LOOP;
-        let volume = cursor.rectangle.volume(rays, &scene.surroundings());
-        let in_planes = volume.ok().filter(|_| is_small).map(|volume| {
+        let in_planes = cursor.volume.as_ref().filter(|_| is_small).map(|volume| {
             let ids = (0..).zip(&scene.items).filter(|(_, b)| volume.sees(b));
             ids.map(|(id, _)| id).collect()
         });
@@ -225,16 +228,18 @@ fn too_many(bodies: usize, one: &str, when: &str) -> LeftOutRow {
 }
 
 /// Cursors at the centres of a grid over the image.
-fn cursors(rays: &Rays, image: SampleGrid) -> Vec<Cursor> {
+fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor> {
     let size = [image.width, image.height].map(f64::from);
     let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
     let rows = 0..CURSORS.height;
     let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
     let cursor = |(column, row): (u32, u32)| {
         let (x, y) = (part(column, CURSORS.width), part(row, CURSORS.height));
+        let rectangle = CursorRectangle::around([x * size[0], y * size[1]], REACH, size);
         Cursor {
             ray: rays.through(x, y),
-            rectangle: CursorRectangle::around([x * size[0], y * size[1]], REACH, size),
+            rectangle,
+            volume: rectangle.volume(rays, around).ok(),
         }
     };
     places.map(cursor).collect()
