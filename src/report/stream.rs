@@ -14,6 +14,7 @@ use super::surface::enter_growths;
 use super::{Report, RunInfo, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{Group, GroupKey, Machine, Part, Plan, Source, Toolchain};
 use crate::scene::GENERATOR_NAME;
+use crate::shown::counted;
 use crate::statistics::{geometric_mean, two_speeds};
 
 /// A line of stream.jsonl.
@@ -288,6 +289,13 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
     if let Some(busy) = report.machine.busy() {
         let advice = "close other programs, or wait, and run again";
         warnings.push(format!("{busy}: {advice}"));
+    }
+    let (threads, cores) = (report.run.threads as usize, report.machine.cores);
+    if threads > cores {
+        let cores = counted(cores, "core");
+        warnings.push(format!(
+            "{threads} threads shared {cores}: their times say little"
+        ));
     }
     if two_speeds * 10 > tasks {
         warnings.push(format!(
