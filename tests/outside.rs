@@ -106,6 +106,11 @@ fn main() -> ExitCode {
         report["run"]["command"],
         format!("enter_your_crate {run} --out run")
     );
+    let own = report["source"]["version"].as_str();
+    assert!(
+        own.is_some_and(|own| own.starts_with("1.2.0 (cullbench ")),
+        "{own:?}"
+    );
     let cells = report["cells"].as_array().expect("cells");
     let cell = cells.iter().find(|cell| cell["structure"] == "tiles");
     let cell = cell.expect("a cell of its own");

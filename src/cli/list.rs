@@ -12,7 +12,7 @@ use super::shared_args::TableFormat;
 use super::{Ending, print, print_json, program, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
-use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
+use crate::measure::{BOUNDS, METRICS, Machine, Toolchain};
 use crate::motion::{MOTION_PARAMS, MOTIONS};
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, FETCHED, MESHES, SAMPLES, SCENE_PARAMS};
@@ -181,7 +181,7 @@ pub fn env(format: TableFormat) -> Result<Ending> {
     let facts = json!({
         "machine": Machine::capture(),
         "toolchain": Toolchain::capture(),
-        "source": Source::capture(),
+        "source": program::source(),
     });
     print(format, &facts, || {
         let mut table = Table::of("fact | value");

@@ -25,7 +25,7 @@ pub fn to_page(
     all.extend(glossary(&all));
     all.push(Block::heading("Machine and command"));
     let command = command_line(&typed_args().unwrap_or_default());
-    let (machine, source) = (Machine::capture(), Source::capture());
+    let (machine, source) = (Machine::capture(), program::source());
     let lines = origin(&command, &machine, &Toolchain::capture(), &source);
     all.extend(lines.map(Block::Line));
     to_html(&title, &all)

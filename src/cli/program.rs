@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
+use crate::measure::Source;
 use crate::spec::{SpecError, nearest};
 
 /// Name and version of the program.
@@ -35,6 +36,14 @@ pub fn name() -> &'static str {
 /// Version of the program; beside another crate's own, that of this one.
 pub fn version() -> &'static str {
     PROGRAM.get().map_or(OWN.1, |(_, version)| version)
+}
+
+/// Source of the build, with the version of the program.
+pub fn source() -> Source {
+    Source {
+        version: version().to_owned(),
+        ..Source::capture()
+    }
 }
 
 /// A help text with commands of this program.

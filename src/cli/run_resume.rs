@@ -14,7 +14,7 @@ use clap::{ArgMatches, CommandFactory, Parser};
 use super::args::{Cli, Command, RunArgs};
 use super::run_plan::{RunPlan, same_digest};
 use super::{program, text};
-use crate::measure::{Machine, Source, Toolchain};
+use crate::measure::{Machine, Toolchain};
 use crate::report::{
     Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, digits, read_report,
     read_stream, utc,
@@ -37,6 +37,7 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     let path = args.out.clone().unwrap_or_else(own);
     let typed = typed_args()?;
     let mut header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
+    header.source = program::source();
     header.run.command = command_line(&typed);
     header.run.suite = plan.suite.clone();
     header.run.shard.clone_from(&args.shard);
@@ -89,7 +90,7 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
         schema_version: SCHEMA_VERSION,
         machine: Machine::capture().by(kernel.kernel),
         toolchain: Toolchain::capture(),
-        source: Source::capture(),
+        source: program::source(),
         binary: binary_digest(),
         ..stream.header.clone()
     };

@@ -69,7 +69,7 @@ pub struct Toolchain {
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Source {
-    /// Version of this crate.
+    /// Version of the program; of another crate's, with that of this crate.
     pub version: String,
     /// Git commit; `None` for a build from a package.
     pub commit: Option<String>,

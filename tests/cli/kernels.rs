@@ -137,7 +137,10 @@ fn a_list_of_threads_enters_structures_that_share_a_query() {
     assert_eq!(done.code, Some(0));
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let few = "run --scene uniform:n=200 --path orbit:frames=2 --structure linear --processes 1";
-    let text = works(here.path(), &format!("{few} --out p --threads {}", cores + 1));
+    let text = works(
+        here.path(),
+        &format!("{few} --out p --threads {}", cores + 1),
+    );
     assert!(text.contains(" threads shared "), "{text}");
     let query = "query --scene uniform:n=40000 --cameras orbit:frames=3 --structure linear";
     let both = works(here.path(), &format!("{query} --ids --threads 1,2"));
