@@ -92,6 +92,12 @@ impl Rows {
 /// Reads all rows; bad is also a bound beyond `limit`.
 fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
+    let is_centre = |name: &String| name.to_lowercase().starts_with("cent");
+    if table.column(BOUNDS[0]).is_none() && table.header.iter().any(is_centre) {
+        let half = "min = centre - half the size, max = centre + half the size";
+        let expected = format!("a header with {}: {half}", BOUNDS.join(","));
+        return Err(table.error("centres in place of bounds", expected));
+    }
     let columns = table.columns(&BOUNDS)?;
     let others = table.header.iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));
@@ -188,6 +194,10 @@ mod tests {
         let cases = [
             (String::new(), "line 1: an empty file"),
             ("a,b,c\n1,2,3\n".into(), "line 1: no column 'min_x'"),
+            (
+                "Center.x,center_y,center_z,extent_x,extent_y,extent_z\n".into(),
+                "line 1: centres in place of bounds; expected a header with min_x,",
+            ),
             (
                 format!("{header}\n1,2,3,4,five,6\n"),
                 "line 2: max_y 'five'",
