@@ -311,15 +311,21 @@ fn cost(ns: f64) -> String {
 
 /// Features that are needed, those that are not, and those that do not apply.
 fn rule_table(rules: &[Omission], all_columns: bool) -> Table {
-    let mut rules: Vec<&Omission> = rules.iter().collect();
+    let mut rules = rules.to_vec();
     rules.sort_by_key(|rule| rule.is_needed().map_or(2, |is| u8::from(!is)));
+    // What keeps several stages from the cameras is told once.
+    for row in (1..rules.len()).rev() {
+        if rules[row].is_needed().is_none() && rules[row].reason == rules[row - 1].reason {
+            "as above".clone_into(&mut rules[row].reason);
+        }
+    }
     let features = features();
     let mut columns = features[..5].to_vec();
     columns.push(("", |rule| rule.reason.clone()));
     if all_columns {
         columns.extend(&features[5..]);
     }
-    Table::with(rules, &columns)
+    Table::with(&rules, &columns)
 }
 
 #[cfg(test)]
