@@ -103,9 +103,10 @@ impl Workers {
     /// # Panics
     /// If a job does.
     pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
+        let most = jobs.size_hint().1.unwrap_or(usize::MAX);
         let work_off = queue(jobs, work);
         self.others.in_place_scope(|scope| {
-            for _ in 1..self.threads {
+            for _ in 1..self.threads.min(most) {
                 scope.spawn(|_| work_off());
             }
             work_off();

@@ -100,7 +100,7 @@ impl<'a> Group<'a> {
 }
 
 /// Fewer points than this are not worth a thread.
-const SHARED_POINTS: usize = 1 << 14;
+pub const SHARED_POINTS: usize = 1 << 14;
 
 fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     let point = |&id: &ItemId| Point::new(items[id as usize].centre(), id);
@@ -116,8 +116,7 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     }];
     // The order within a group depends on that group alone, not on the thread that
     // halves it. First, round by round, enough groups to keep all threads busy.
-    let enough = 4 * threads;
-    while threads > 1 && open.len() < enough {
+    while threads > 1 && open.len() < 4 * threads {
         if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
             break;
         }
@@ -130,7 +129,6 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
         });
         open = halves.into_inner().unwrap_or_else(PoisonError::into_inner);
     }
-    let threads = if open.len() < enough { 1 } else { threads };
     share(threads, open.into_iter(), Group::put_in_order);
     for (id, point) in ids.iter_mut().zip(&points) {
         *id = point.id();
