@@ -101,6 +101,13 @@ impl Rays {
         corners.map(|[x, y]| self.through(x, y).at(self.camera.lens.near()))
     }
 
+    /// The rays of all samples, row by row.
+    pub fn of_grid(&self, grid: SampleGrid) -> impl Iterator<Item = Ray> {
+        let rows = 0..grid.height;
+        let places = rows.flat_map(move |row| (0..grid.width).map(move |column| (column, row)));
+        places.map(move |(column, row)| self.sample(grid, column, row))
+    }
+
     /// The ray of a sample: the centre of a pixel, column from the left and row
     /// from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {

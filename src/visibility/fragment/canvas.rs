@@ -223,11 +223,8 @@ impl<B: Body> Canvas<B> {
         let grid = self.grid();
         self.screen = Screen::of(rays, grid);
         self.probes.clear();
-        for row in 0..grid.height {
-            let ray = |column| rays.sample(grid, column, row);
-            let probes = (0..grid.width).map(|column| B::probe(&ray(column), self.origin));
-            self.probes.extend(probes);
-        }
+        let probes = rays.of_grid(grid).map(|ray| B::probe(&ray, self.origin));
+        self.probes.extend(probes);
     }
 
     /// Columns and rows.

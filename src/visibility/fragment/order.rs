@@ -74,8 +74,7 @@ pub fn draw_orders<B: Body>(
         places
     });
     let mut tallies = [Tally::default(); ORDERS.len()];
-    for (row, column) in (0..grid.height).flat_map(|row| (0..grid.width).map(move |c| (row, c))) {
-        let ray = rays.sample(grid, column, row);
+    for ray in rays.of_grid(grid) {
         let probe = index.probe(&ray);
         let mut met = index.all_along(&ray);
         met.retain(|(item, _)| places[0][*item as usize] != NOWHERE);

@@ -7,7 +7,6 @@ use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
 use super::view::View;
 use crate::kernel::{Isa, LaneMask};
-use crate::query::Bits;
 use crate::visibility::SampleGrid;
 
 /// A depth buffer of occluders.
@@ -30,14 +29,7 @@ pub trait OcclusionBuffer {
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
 
     /// Tests some boxes of a block; returns the lanes of the hidden ones.
-    #[inline(always)]
-    fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
-        let mut hidden = 0;
-        for lane in Bits(lanes.into()) {
-            hidden |= LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane;
-        }
-        hidden
-    }
+    fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask;
 }
 
 /// Draws the occluders of a candidate; returns the number that cover any pixel.

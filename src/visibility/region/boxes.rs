@@ -33,6 +33,9 @@ impl Ground for Boxes {
         });
         inside
     }
+
+    /// None: regions are their parts.
+    fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
 }
 
 impl RegionGraph {

@@ -18,8 +18,10 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 
     /// Appends regions that a closed box meets outside of their parts.
     ///
-    /// None unless regions differ from their parts.
-    fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
+    /// All that it meets, as far as the regions differ from their parts or have none.
+    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
+        self.regions_at(b, out);
+    }
 }
 
 /// Regions joined by openings: sight leads from one to another through these only.

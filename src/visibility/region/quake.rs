@@ -46,11 +46,6 @@ impl Ground for LeafGround {
         }
         inside
     }
-
-    /// Regions have no parts: all of their items are found here.
-    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
-        self.regions_at(b, out);
-    }
 }
 
 impl RegionGraph {

@@ -49,7 +49,10 @@ impl Selection {
 
     /// All triangles of these items: what the object stage left.
     pub fn of_items(clusters: &Clusters, items: impl IntoIterator<Item = u32>) -> Selection {
-        let mut selection = Selection::none(clusters);
+        let mut selection = Selection {
+            blocks: vec![[0; LANES]; clusters.len().div_ceil(LANES)],
+            clusters: clusters.len(),
+        };
         let words = selection.words_mut();
         for item in items {
             for cluster in clusters.of_item[item as usize].clone() {
@@ -57,14 +60,6 @@ impl Selection {
             }
         }
         selection
-    }
-
-    fn none(clusters: &Clusters) -> Selection {
-        let clusters = clusters.len();
-        Selection {
-            blocks: vec![[0; LANES]; clusters.div_ceil(LANES)],
-            clusters,
-        }
     }
 
     /// One word per cluster; bit `i` is the `i`-th of [`Clusters::triangles_of`].

@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use super::super::rays::Along;
 use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
-use super::ray_tree::RayTree;
-use super::slabs::above;
+use super::ray_tree::{RayTree, misses};
+use super::slabs::{Slabs, above};
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 use crate::scene::Surfaces;
@@ -90,17 +90,11 @@ impl<B: Body> BodyIndex<B> {
         &self.bodies[place as usize].0
     }
 
-    /// Shows each body that a ray does not certainly miss to a visitor, in no order.
-    ///
-    /// For rays that the slab tests in f32 do not cover.
-    fn walk_in_f64(&self, ray: &Ray, mut visit: impl FnMut(&B)) {
-        (self.tree).search_in_f64(ray, |place| visit(self.body(place)));
-    }
-
     /// Shows each body that a ray may meet to a visitor, nearest nodes first.
     #[inline]
     pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
-        if !self.tree.is_passed_by(ray) {
+        // It costs less than preparing the ray for the nodes.
+        if !misses(ray, self.tree.zero, &self.tree.bounds) {
             self.kernel.run(Walk(self, ray, visitor));
         }
     }
@@ -115,8 +109,7 @@ impl<B: Body> BodyIndex<B> {
     /// Least number of tests of bodies by the rays to all samples of a grid.
     pub fn tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
         let mut tests = 0;
-        for (column, row) in (0..grid.width).flat_map(|x| (0..grid.height).map(move |y| (x, y))) {
-            let ray = rays.sample(grid, column, row);
+        for ray in rays.of_grid(grid) {
             let meeting = self.front_of(&ray).meeting;
             let end = meeting.map_or(ray.far, |at| B::Probe::at_most(&at));
             self.walk(&ray, &mut |_: &B| {
@@ -162,13 +155,13 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let Walk(of, ray, visitor) = self;
-        let Some(slabs) = of.tree.slabs(ray) else {
-            return of.walk_in_f64(ray, |body| {
-                visitor.visit(body);
+        let Some(slabs) = Slabs::of(ray, of.tree.zero, of.tree.bounds.reach()) else {
+            return of.tree.search_in_f64(ray, |place| {
+                visitor.visit(of.body(place));
             });
         };
         let mut limit = f64::INFINITY;
-        let mut bound = slabs.far();
+        let mut bound = slabs.far;
         of.tree.search(isa, &slabs, |place| {
             let latest = visitor.visit(of.body(place));
             if latest < limit {

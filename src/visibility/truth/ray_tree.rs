@@ -27,24 +27,10 @@ pub struct RayTree {
     /// World position of the zero of the nodes.
     pub zero: DVec3,
     /// Bounds of all boxes.
-    bounds: Aabb,
+    pub bounds: Aabb,
 }
 
 impl RayTree {
-    /// The ray for the tests of the nodes; `None` if they do not cover it.
-    #[inline(always)]
-    pub fn slabs(&self, ray: &Ray) -> Option<Slabs> {
-        Slabs::of(ray, self.zero, self.bounds.reach())
-    }
-
-    /// Returns `true` if the ray certainly misses all boxes.
-    ///
-    /// Called first, since it costs less than preparing the ray for the nodes.
-    #[inline(always)]
-    pub fn is_passed_by(&self, ray: &Ray) -> bool {
-        misses(ray, self.zero, &self.bounds)
-    }
-
     /// Offers the place of every item that the ray does not certainly miss, in f64.
     ///
     /// All bodies along the ray, whatever their depth: the slab tests do not cover it.
@@ -80,7 +66,7 @@ impl RayTree {
         if self.nodes.is_empty() {
             return;
         }
-        let mut bound = slabs.far();
+        let mut bound = slabs.far;
         let mut at = self.root;
         loop {
             let node = &self.nodes[at.node()];
@@ -136,7 +122,7 @@ impl RayTree {
 /// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
 /// No product overflows or underflows for numbers that a [`Probe`](super::Probe) takes.
 #[inline(always)]
-fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
+pub fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     let start = ray.origin - zero;
     let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     let most = start.abs().max(min.abs()).max(max.abs()).max_element();
@@ -237,11 +223,6 @@ impl Child {
     }
 }
 
-const EMPTY: Node = Node {
-    boxes: BoxBlock::EMPTY,
-    children: [0; LANES],
-};
-
 impl RayTree {
     /// Builds the tree over boxes relative to a zero. O(n log n).
     ///
@@ -265,7 +246,10 @@ impl RayTree {
                 None => root = child,
                 Some((node, lane)) => nodes[node].children[lane] = child.0,
             }
-            let mut node = EMPTY;
+            let mut node = Node {
+                boxes: BoxBlock::EMPTY,
+                children: [0; LANES],
+            };
             for (lane, part) in parts.iter().enumerate() {
                 node.boxes.set(lane, &part.bounds);
                 node.children[lane] = part.range.start as u32;

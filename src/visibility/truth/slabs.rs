@@ -67,7 +67,7 @@ pub struct Slabs {
     high: [f32; 3],
     /// Near and far, rounded down and up.
     near: f32,
-    far: f32,
+    pub far: f32,
 }
 
 /// Result of the test of sixteen boxes.
@@ -122,12 +122,6 @@ impl Slabs {
             slabs.high[axis] = (centre + slack) as f32;
         }
         Some(slabs)
-    }
-
-    /// The far plane, rounded up: nothing deeper is met.
-    #[inline(always)]
-    pub fn far(&self) -> f32 {
-        self.far
     }
 
     /// The boxes that the ray can meet no deeper than `most`.

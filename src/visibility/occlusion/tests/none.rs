@@ -2,8 +2,8 @@
 
 use super::super::buffer::OcclusionBuffer;
 use super::super::outline::{Coverage, Outline};
-use super::super::rect::Rect;
-use crate::kernel::Isa;
+use super::super::rect::{Rect, Rects};
+use crate::kernel::{Isa, LaneMask};
 use crate::visibility::SampleGrid;
 
 /// A buffer that hides nothing. What no ray of the image can meet is still left
@@ -26,5 +26,10 @@ impl OcclusionBuffer for NoOcclusion {
     #[inline(always)]
     fn hides<I: Isa>(&self, _: I, _: &Rect) -> bool {
         false
+    }
+
+    #[inline(always)]
+    fn hides_lanes<I: Isa>(&self, _: I, _: &Rects, _: LaneMask) -> LaneMask {
+        0
     }
 }

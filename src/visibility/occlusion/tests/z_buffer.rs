@@ -4,8 +4,9 @@
 
 use super::super::buffer::OcclusionBuffer;
 use super::super::outline::{Coverage, Outline};
-use super::super::rect::Rect;
-use crate::kernel::{Isa, LANES, first_lanes};
+use super::super::rect::{Rect, Rects};
+use crate::kernel::{Isa, LANES, LaneMask, first_lanes};
+use crate::query::Bits;
 use crate::visibility::SampleGrid;
 
 /// Nearness at the centre of each pixel; 0 where nothing was drawn.
@@ -67,5 +68,12 @@ impl OcclusionBuffer for ZBuffer {
             }
         }
         true
+    }
+
+    #[inline(always)]
+    fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
+        Bits(lanes.into()).fold(0, |hidden, lane| {
+            hidden | LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane
+        })
     }
 }

@@ -202,6 +202,7 @@ impl DoomMap {
     }
 }
 
+/// Leaves of the map's tree differ from its sectors by what a node builder rounds.
 impl Ground for SectorGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let mut inside = true;
@@ -224,11 +225,6 @@ impl Ground for SectorGround {
                 let [floor, ceiling] = self.map.sectors[sector as usize];
                 floor <= b.min.z && b.max.z <= ceiling
             })
-    }
-
-    /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
-    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
-        self.regions_at(b, out);
     }
 }
 
