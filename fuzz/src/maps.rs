@@ -6,7 +6,7 @@ use cullbench::camera::{Camera, Frame, Lens};
 use cullbench::index::{Input, Registry};
 use cullbench::scene::{CameraPlace, LoadOptions, Regions, part_names, read_bytes, read_ibsp};
 use cullbench::visibility::Rays;
-use cullbench::visibility::region::{Pvs, RegionGraph, RegionRow, Scratch};
+use cullbench::visibility::region::{Pvs, RegionGraph, RegionRow, Scratch, Source};
 
 use crate::read;
 
@@ -49,7 +49,7 @@ pub fn ibsp(bytes: &[u8]) {
 /// Finds what each place sees of the regions.
 pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
     let graph = Arc::new(graph);
-    let row = RegionRow::search(&graph);
+    let row = RegionRow::of(Source::PortalRect, &graph, None);
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
     let lens = Lens::perspective(60.0, 1.5, 1.0, None).expect("a lens");
     for place in places {

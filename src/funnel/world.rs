@@ -9,7 +9,7 @@ use anyhow::{Result, bail, ensure};
 use super::error::check_memory;
 use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends, left_out_of};
 use crate::camera::{CameraError, PlaneOptions};
-use crate::geometry::ConvexVolume;
+use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Setting, WorkloadError, input_of};
@@ -22,8 +22,8 @@ use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::OccluderScene;
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{Pvs, RegionGraph, RegionItems, RegionRow, Source};
-use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
+use crate::visibility::region::{BACK_ENDS, Pvs, RegionGraph, RegionItems, RegionRow, Source};
+use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, surfaces_of};
 
 /// Bytes per item of structure, solids, occluders and trees for rays.
 ///
@@ -166,10 +166,14 @@ impl<'a> World<'a> {
         let structures = built.collect::<Result<_, _>>()?;
         let mut cut_outs = None;
         if let (Some(typed), Shape::Boxes(solids)) = (input.cut_outs, &mut shape) {
-            let graph = regions.as_ref().map(|regions| &*regions.graph);
-            let holes = holes_of(typed, scene, graph);
-            for item in (0..scene.items.len() as ItemId).filter(|&item| holes.of(item).is_some()) {
-                solids.hides_nothing(item);
+            // A view into the next room leads through portals only: walls have no holes.
+            let walls = regions.as_ref().map(|regions| regions.graph.borders(scene));
+            let is_free = |item| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
+            let holes = typed.holes(scene.items.len(), is_free);
+            // What has holes may be hidden and hides nothing.
+            let all = solids.inner.iter_mut().zip(&holes.of_item);
+            for (inner, _) in all.filter(|(_, hole)| hole.is_some()) {
+                *inner = Aabb::EMPTY;
             }
             cut_outs = Some(holes);
         }
@@ -367,22 +371,19 @@ impl Regions {
     /// Back ends of a scene; `None` without regions, and for a map whose linedefs
     /// contradict each other.
     pub fn of(scene: &Scene) -> Option<Regions> {
-        let (graph, source, table) = match (DoomMap::of_scene(scene), &scene.regions) {
-            (Some(map), _) => (map.graph().ok()?, Source::Reject, map.reject()),
-            (None, scene::Regions::Leaves(map)) => (
-                RegionGraph::of_quake(map),
-                Source::Claim,
-                Pvs::of_quake(map),
-            ),
-            (None, _) => (RegionGraph::of_scene(scene)?, Source::PortalRect, None),
+        let (graph, table) = match (DoomMap::of_scene(scene), &scene.regions) {
+            (Some(map), _) => (map.graph().ok()?, map.reject()),
+            (None, scene::Regions::Leaves(map)) => (RegionGraph::of_quake(map), Pvs::of_quake(map)),
+            (None, _) => (RegionGraph::of_scene(scene)?, None),
         };
-        let graph = Arc::new(graph);
-        let search = Some(RegionRow::search(&graph));
-        let search = search.filter(|row| row.back_end.is_for(scene));
-        let stored = |table| RegionRow::stored(source, graph.clone(), Arc::new(table));
-        let stored = table.and_then(stored);
+        let (graph, table) = (Arc::new(graph), table.map(Arc::new));
+        let there = BACK_ENDS.iter().filter(|row| row.is_for(scene));
+        let rows = there.filter_map(|row| match row.build {
+            Source::PortalRect => Some(RegionRow::of(row.build, &graph, None)),
+            stored => Some(RegionRow::of(stored, &graph, Some(table.clone()?))),
+        });
         Some(Regions {
-            rows: search.into_iter().chain(stored).collect(),
+            rows: rows.collect(),
             items: RegionItems::of(&graph, scene),
             graph,
         })

@@ -18,7 +18,6 @@ pub mod truth;
 
 use serde::Serialize;
 
-pub use fragment::holes_of;
 pub use level::Level;
 pub use rays::{Ray, Rays, SampleGrid};
 pub use region::doom::surfaces_of;

@@ -9,7 +9,6 @@ use glam::DVec3;
 
 use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
-use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
 /// The items of a scene as solid boxes, in three forms.
@@ -36,11 +35,6 @@ impl Solids {
             outer: scene.items.clone(),
             origin: scene.origin,
         }
-    }
-
-    /// Takes an item as something with holes, which may be hidden and hides nothing.
-    pub fn hides_nothing(&mut self, item: ItemId) {
-        self.inner[item as usize] = Aabb::EMPTY;
     }
 }
 

@@ -11,7 +11,7 @@ use cullbench::scene::{WadMap, map_names, read_boxes_csv};
 use cullbench::stress::{read_vectors, replay};
 use cullbench::visibility::Rays;
 use cullbench::visibility::region::doom::DoomMap;
-use cullbench::visibility::region::{RegionRow, Scratch};
+use cullbench::visibility::region::{RegionRow, Scratch, Source};
 use glam::DVec3;
 
 use super::process::*;
@@ -197,7 +197,7 @@ fn damaged_maps_seen_through() {
         let Ok(graph) = map.graph().map(Arc::new) else {
             return Ok(());
         };
-        let row = RegionRow::search(&graph);
+        let row = RegionRow::of(Source::PortalRect, &graph, None);
         let (mut scratch, mut seen) = (Scratch::default(), Vec::new());
         for place in &scene.places {
             let frame = Frame::looking_along(place.eye, place.forward, DVec3::Z);

@@ -5,9 +5,8 @@
 use serde::Serialize;
 
 use crate::query::ItemId;
-use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::scene::{SeededRng, WorldBox, mix64};
 use crate::spec::{Spec, SpecError};
-use crate::visibility::region::RegionGraph;
 use crate::visibility::truth::{Along, Crossing, Probe};
 
 named! {
@@ -32,11 +31,10 @@ impl Mask {
             }
             Mask::Foliage => {
                 let cell = |x: f64| (x * 8.0).floor() as i64 as u64;
-                // SplitMix64 (Steele, Lea, Flood 2014) of the cell.
-                let mut z = cell(u).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ cell(v).rotate_left(32);
-                z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-                z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-                (z ^ z >> 31) % 10 < 6
+                // The constant that the hash adds first.
+                const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+                let key = cell(u).wrapping_mul(STEP) ^ cell(v).rotate_left(32);
+                mix64(key.wrapping_sub(STEP)) % 10 < 6
             }
         }
     }
@@ -139,15 +137,6 @@ impl CutOuts {
         let of_item = (0..items as ItemId).map(surface).collect();
         Holes { of_item }
     }
-}
-
-/// The items of a scene that are cut out: all but the walls of its rooms.
-///
-/// The regions of the rooms are `graph`; a view into the next room leads through portals only.
-pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> Holes {
-    let walls = graph.map(|graph| graph.borders(scene));
-    let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
-    typed.holes(scene.items.len(), is_free)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ mod draw;
 mod order;
 
 pub use canvas::{Canvas, Rectangle, Screen, Stencil};
-pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface, holes_of};
+pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface};
 pub use draw::{Drawable, Drawn, Tally, Tests};
 pub use order::{DrawOrder, ORDERS, draw_orders};
 

@@ -123,22 +123,12 @@ pub struct Scratch {
 }
 
 impl RegionRow {
-    /// The back end that searches.
-    pub fn search(graph: &Arc<RegionGraph>) -> RegionRow {
-        RegionRow::of(Source::PortalRect, graph.clone(), None)
-    }
-
-    /// A back end that reads stored pairs; `None` if they are of another number of
-    /// regions.
-    pub fn stored(source: Source, graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<RegionRow> {
-        (pvs.len() == graph.len()).then(|| RegionRow::of(source, graph, Some(pvs)))
-    }
-
-    fn of(source: Source, graph: Arc<RegionGraph>, pvs: Option<Arc<Pvs>>) -> RegionRow {
+    /// A back end that searches, or reads stored pairs of as many regions.
+    pub fn of(source: Source, graph: &Arc<RegionGraph>, pvs: Option<Arc<Pvs>>) -> RegionRow {
         let row = BACK_ENDS.iter().find(|row| row.build == source);
         RegionRow {
             back_end: *row.expect("a row for every source"),
-            graph,
+            graph: graph.clone(),
             pvs,
         }
     }

@@ -21,8 +21,8 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
         let (map, graph) = sample(&scene);
         let reject = Arc::new(map.reject().unwrap());
         let rows = [
-            RegionRow::search(&graph),
-            RegionRow::stored(Source::Reject, graph.clone(), reject).unwrap(),
+            RegionRow::of(Source::PortalRect, &graph, None),
+            RegionRow::of(Source::Reject, &graph, Some(reject)),
         ];
         let mut rng = SeededRng::new(8);
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
@@ -71,7 +71,7 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
     ] {
         let eye = (middle + right * away).extend(floor + height);
         let rays = looking(eye, &mut rng);
-        let (row, mut out) = (RegionRow::search(&graph), Vec::new());
+        let (row, mut out) = (RegionRow::of(Source::PortalRect, &graph, None), Vec::new());
         let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
         assert_eq!(answer, place, "{away} {height}");
     }

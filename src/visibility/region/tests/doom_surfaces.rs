@@ -36,7 +36,7 @@ fn world(name: &str) -> World {
 fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (usize, usize) {
     let index = SurfaceIndex::build(&world.surfaces);
     let items = RegionItems::of(graph, &world.scene);
-    let row = RegionRow::search(graph);
+    let row = RegionRow::of(Source::PortalRect, graph, None);
     let mut rng = SeededRng::new(12);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
     let (mut marks, mut list) = (IdSet::default(), Vec::new());

@@ -45,7 +45,7 @@ fn a_stored_row_answers_what_is_stored() {
     let (mut rng, mut scratch, mut homes) = (SeededRng::new(8), Scratch::default(), Vec::new());
     let some = Pvs::of_pairs(graph.len(), |from, to| (from * 7 + to * 3) % 5 < 2);
     let pvs = Arc::new(some.unwrap());
-    let stored = RegionRow::stored(Source::Claim, graph.clone(), pvs.clone()).unwrap();
+    let stored = RegionRow::of(Source::Claim, &graph, Some(pvs.clone()));
     let [mut answer, mut wanted] = [Vec::new(), Vec::new()];
     for _ in 0..200 {
         let rays = eye_in(&graph, &mut rng);
@@ -71,7 +71,7 @@ const WORLDS: [&str; 4] = [
 fn no_region_that_a_ray_passes_is_missed() {
     for world in WORLDS {
         let (_, graph) = rooms(world);
-        let row = RegionRow::search(&graph);
+        let row = RegionRow::of(Source::PortalRect, &graph, None);
         assert_eq!(missing(&row, &graph, 60, 9), 0, "{world}");
     }
 }
@@ -81,7 +81,7 @@ fn no_cube_that_a_ray_passes_is_missed() {
     let mut rng = SeededRng::new(17);
     for count in [[5, 1, 1], [4, 4, 1], [3, 3, 3], [2, 2, 4]] {
         let graph = cubes(count, &mut rng);
-        let row = RegionRow::search(&graph);
+        let row = RegionRow::of(Source::PortalRect, &graph, None);
         assert_eq!(missing(&row, &graph, 60, 9), 0, "{count:?}");
     }
 }
@@ -90,7 +90,11 @@ fn no_cube_that_a_ray_passes_is_missed() {
 fn a_forgotten_opening_is_noticed() {
     let (_, graph) = rooms(WORLDS[0]);
     for opening in [0, 20, 33] {
-        let wrong = RegionRow::search(&Arc::new(without_opening(&graph, opening)));
+        let wrong = RegionRow::of(
+            Source::PortalRect,
+            &Arc::new(without_opening(&graph, opening)),
+            None,
+        );
         assert!(missing(&wrong, &graph, 800, 9) > 0, "{opening}");
     }
 }
@@ -126,7 +130,11 @@ fn openings_with_a_thickness_are_seen_through() {
         let lens = crate::camera::Lens::perspective(60.0, 1.0, 0.1, None).unwrap();
         let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        RegionRow::search(&graph).from_eye(&rays, &mut Scratch::default(), &mut out);
+        RegionRow::of(Source::PortalRect, &graph, None).from_eye(
+            &rays,
+            &mut Scratch::default(),
+            &mut out,
+        );
         out.len()
     };
     assert_eq!(answer(DVec3::X), 3);

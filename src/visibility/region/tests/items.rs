@@ -16,7 +16,7 @@ fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> 
     let graph = Arc::new(graph_of(&scene));
     let solids = Solids::of(&scene);
     let items = RegionItems::of(&graph, &scene);
-    let row = RegionRow::search(&graph);
+    let row = RegionRow::of(Source::PortalRect, &graph, None);
     let mut rng = SeededRng::new(21);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
     let (mut marks, mut list) = (IdSet::default(), Vec::new());

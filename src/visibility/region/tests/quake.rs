@@ -22,7 +22,7 @@ fn two_rooms() -> (Scene, RegionRow) {
     };
     let graph = RegionGraph::of_quake(map).into();
     let pvs = Pvs::of_quake(map).unwrap();
-    let row = RegionRow::stored(Source::Claim, graph, pvs.into()).unwrap();
+    let row = RegionRow::of(Source::Claim, &graph, Some(pvs.into()));
     (scene, row)
 }
 

@@ -93,7 +93,7 @@ fn lost(shrink: f64) -> (usize, usize) {
         let lens = Lens::perspective(60.0, 1.3, 1e-4, Some(1e3)).unwrap();
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
-        RegionRow::search(&told).from_eye(&rays, &mut scratch, &mut out);
+        RegionRow::of(Source::PortalRect, &told, None).from_eye(&rays, &mut scratch, &mut out);
         lost += usize::from(out.binary_search(&(length as u32 - 1)).is_err());
     }
     (lost, accepted)
@@ -121,7 +121,11 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     let answer = |lens: Lens| {
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        let place = RegionRow::search(&graph).from_eye(&rays, &mut Scratch::default(), &mut out);
+        let place = RegionRow::of(Source::PortalRect, &graph, None).from_eye(
+            &rays,
+            &mut Scratch::default(),
+            &mut out,
+        );
         (place, out.len())
     };
     let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
