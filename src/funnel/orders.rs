@@ -82,7 +82,10 @@ impl<'w> Orders<'w> {
         for view in self.world.views() {
             let tallies = self.counted(view, index.as_ref());
             for (row, tally) in rows.iter_mut().zip(tallies) {
-                row.add(&tally, self.views.len() as f64);
+                let mean = |count: u64| count as f64 / self.views.len() as f64;
+                row.fragment_count += mean(tally.fragment_count);
+                row.shaded_count += mean(tally.shaded_count);
+                row.covered_count += mean(tally.covered_count);
             }
         }
         for row in &mut rows {
@@ -111,18 +114,5 @@ impl<'w> Orders<'w> {
         };
         let index = BodyIndex::of(&Boxes::some(solids, left.clone()), world.kernel);
         draw_orders(image, &index, &is_opaque, &orders)
-    }
-}
-
-impl OrderRow {
-    /// Adds one of `views` views to the means.
-    fn add(&mut self, tally: &Tally, views: f64) {
-        for (mean, count) in [
-            (&mut self.fragment_count, tally.fragment_count),
-            (&mut self.shaded_count, tally.shaded_count),
-            (&mut self.covered_count, tally.covered_count),
-        ] {
-            *mean += count as f64 / views;
-        }
     }
 }

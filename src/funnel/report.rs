@@ -88,7 +88,7 @@ pub struct CutOutRow {
 }
 
 /// A stage done by a back end.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct StageRow {
     /// The back end.
     #[serde(flatten)]
@@ -122,10 +122,7 @@ impl StageRow {
             unit: back_end.stage.unit(),
             back_end,
             errors,
-            time: None,
-            ns_per_removed: None,
-            ns_per_decided: None,
-            fragments: None,
+            ..StageRow::default()
         }
     }
 
@@ -167,7 +164,7 @@ impl StageRow {
 }
 
 /// Worth of a stage where all others are as in the chain.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct Gain {
     /// The stage that is left out on the other side.
     pub stage: StageKind,
@@ -208,13 +205,10 @@ impl Gain {
             stage,
             back_end: back_end.to_owned(),
             unit,
-            with_ns: None,
-            without_ns: None,
             with_count,
             without_count,
-            break_even: None,
-            ratio: None,
             tasks,
+            ..Gain::default()
         }
     }
 

@@ -16,10 +16,12 @@ use crate::visibility::{Guarantee, Row, SampleGrid, region};
 
 named! {
     /// A stage that takes candidates and returns fewer of them.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+    #[derive(Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum StageKind {
         /// Rooms that can be seen into, and so items.
+        #[default]
         Region = "region",
         /// Items that the frustum meets.
         Object = "object",
@@ -50,7 +52,7 @@ impl StageKind {
 pub const NONE: &str = "none";
 
 /// A way to do a stage.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Default, Debug, Serialize)]
 pub struct BackEnd {
     /// The stage that it does.
     pub stage: StageKind,

@@ -29,8 +29,7 @@ pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
     let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
     let samples = world.samples;
     let items = world.items() as ItemId;
-    let mut all = Vec::with_capacity(world.views.len());
-    for view in world.views() {
+    let of_view = |view| {
         let rays = world.rays(view);
         let truth = rays_end.visible(rays, samples, threads);
         let camera = world.views[view].camera;
@@ -39,9 +38,9 @@ pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
         // Floors and ceilings of a map come behind its items.
         seen.retain(|(item, _)| *item < items);
-        all.push(seen);
-    }
-    Ok(all)
+        Ok(seen)
+    };
+    world.views().map(of_view).collect()
 }
 
 /// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.
@@ -94,13 +93,12 @@ impl RaysEnd<'_> {
 
     fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
         match self {
-            RaysEnd::Boxes(index, Some(holes)) => {
+            RaysEnd::Boxes(index, holes) => {
                 let opaque = |body: &SolidBox, probe: &_, at: &_| {
-                    holes.opaque(body.item, &body.b, probe, at)
+                    holes.is_none_or(|holes| holes.opaque(body.item, &body.b, probe, at))
                 };
                 SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
             }
-            RaysEnd::Boxes(index, None) => SampleTruth::of(index, rays, grid, threads),
             RaysEnd::Triangles(index) => SampleTruth::of(index, rays, grid, threads),
         }
     }
@@ -169,7 +167,7 @@ pub fn count_items(
 }
 
 /// Errors of a stage over all views. Counts are means per view.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Default, Debug, Serialize)]
 pub struct Errors {
     /// Candidates: items or triangles.
     pub input_count: f64,

@@ -74,29 +74,23 @@ impl Surfaces {
         }
     }
 
-    /// Boxes about an origin, each as twelve triangles, opaque and one-sided. O(n).
-    pub fn of_boxes(origin: DVec3, boxes: impl IntoIterator<Item = Aabb>) -> Surfaces {
-        let mut all = Surfaces::about(origin);
-        let push = |b: Aabb| all.push_box(SurfaceKind::Opaque, false, &b);
-        boxes.into_iter().for_each(push);
-        all
-    }
-
-    /// Boxes as they are written: [`Surfaces::of_boxes`], rounded outward about an
-    /// origin, and as flat as they are. No face comes to lie on the other side of the
-    /// origin.
+    /// Boxes as they are written, each as twelve triangles, opaque and one-sided. O(n).
+    ///
+    /// They are rounded outward about an origin, and as flat as they are. No face comes to
+    /// lie on the other side of the origin.
     pub fn of_boxes_about<'b>(
         origin: DVec3,
         boxes: impl Iterator<Item = &'b WorldBox>,
     ) -> Surfaces {
-        let rounded = boxes.map(|b| {
+        let mut all = Surfaces::about(origin);
+        for b in boxes {
             let mut rounded = Aabb::rounded_outward(b.min, b.max, origin);
             for axis in (0..3).filter(|&axis| b.min[axis] == b.max[axis]) {
                 rounded.max[axis] = rounded.min[axis];
             }
-            rounded
-        });
-        Surfaces::of_boxes(origin, rounded)
+            all.push_box(SurfaceKind::Opaque, false, &rounded);
+        }
+        all
     }
 
     /// Some of the items, renumbered in this order.
@@ -378,7 +372,10 @@ mod tests {
     impl Surfaces {
         /// Every item of a scene as the smallest f32 box that holds it.
         pub fn from_boxes(scene: &Scene) -> Surfaces {
-            Surfaces::of_boxes(scene.origin, scene.items.iter().copied())
+            let mut all = Surfaces::about(scene.origin);
+            let push = |b| all.push_box(SurfaceKind::Opaque, false, b);
+            scene.items.iter().for_each(push);
+            all
         }
     }
 

@@ -29,8 +29,8 @@ impl Grid {
         Cells::new(self.cells, self.inside(&self.touched(part)))
     }
 
-    /// Lower corner of a cell.
-    fn corner(&self, cell: [usize; 3]) -> Vec3 {
+    /// Lower corner of a cell, scene-local.
+    pub fn corner(&self, cell: [usize; 3]) -> Vec3 {
         let [x, y, z] = cell.map(|index| index as f64);
         (self.low + self.step * DVec3::new(x, y, z)).as_vec3()
     }
@@ -95,11 +95,6 @@ impl Grid {
         }
         let rows = free.iter().zip(&outside);
         rows.map(|(free, outside)| free & !outside).collect()
-    }
-
-    /// A box of cells, scene-local.
-    pub fn to_box(&self, [low, high]: CellBox) -> Aabb {
-        Aabb::new(self.corner(low), self.corner(high))
     }
 }
 

@@ -98,7 +98,8 @@ fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f
     let mut inside = grid.cells(part);
     let tried = std::iter::from_fn(|| inside.next_box(0..cells));
     for (_, tried) in tried.take(most) {
-        let Some(proven) = proven(part, grid.to_box(tried)) else {
+        let [low, high] = tried.map(|cell| grid.corner(cell));
+        let Some(proven) = proven(part, Aabb::new(low, high)) else {
             continue;
         };
         let exact = |b| WorldBox::of(b, DVec3::ZERO);
