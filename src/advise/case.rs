@@ -45,20 +45,15 @@ impl<'a> Case<'a> {
         })
     }
 
-    pub fn scene(&self) -> &'a Scene {
-        self.workload.scene
-    }
-
-    /// Number of cameras.
-    pub fn cameras(&self) -> usize {
-        self.workload.views.len()
-    }
-
     /// Cameras of the path with the truth about them, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let judged = spread(self.scene().items.len(), MOST_JUDGED, self.cameras());
+        let judged = spread(
+            self.workload.scene.items.len(),
+            MOST_JUDGED,
+            self.workload.views.len(),
+        );
         let truths = judged.filter_map(|camera| {
-            let truth = Truth::of_scene(&self.workload.cameras[camera], self.scene())?;
+            let truth = Truth::of_scene(&self.workload.cameras[camera], self.workload.scene)?;
             Some((camera, truth))
         });
         truths.collect()
@@ -81,7 +76,7 @@ impl<'a> Case<'a> {
 
     /// The tree over the items as a culling test indexes them.
     pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
-        let scene = self.scene();
+        let scene = self.workload.scene;
         let items = test.items(&scene.items);
         self.spec.build(input_for(test, scene, &items))
     }
@@ -90,7 +85,7 @@ impl<'a> Case<'a> {
     ///
     /// The eye's distance for a scene that is a point, and not zero even there.
     fn depth(&self, camera: &Camera) -> f64 {
-        let Scene { bounds, origin, .. } = self.scene();
+        let Scene { bounds, origin, .. } = self.workload.scene;
         let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
         let depths = [high, camera.frame.eye - *origin].map(|end| end.distance(low));
         let depth = depths.into_iter().find(|depth| *depth > 0.0);

@@ -14,9 +14,9 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 pub use case::AdviseInput;
-pub use change::{Axis, Beside, Change};
+pub use change::{Axis, Beside};
 pub use choice::{MotionChoice, StructureChoice, TestChoice, TestRow, ns, policy_of};
-pub use rule::Omission;
+pub use rule::{Advice, Omission};
 pub use trials::{Check, Side};
 
 use crate::culling::CullingTest;
@@ -25,43 +25,11 @@ use crate::measure::{
     Answer, OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, timed,
 };
 use crate::motion::Motion;
-use crate::statistics::Estimate;
 
 use case::Case;
-use rule::{Draft, Facts, Finding, Rule};
+use rule::{Draft, Finding, Rule};
 use rules::{RULES, input as stages};
 use trials::{Answered, BASE, Trials};
-
-/// Structure, test and features to leave out, with the evidence.
-#[derive(Clone, Debug, Serialize)]
-pub struct Advice {
-    /// Cost of drawing an item that is not visible, ns.
-    pub draw_ns: f64,
-    /// Number of timed processes; an interval needs three or more.
-    pub processes: usize,
-    /// A/A check: time of the fastest tree, entered a second time, / its own time; the
-    /// interval contains 1.
-    pub twin: Option<Estimate>,
-    /// The structure to take.
-    pub structure: StructureChoice,
-    /// The culling test to take.
-    pub test: TestChoice,
-    /// One omission per rule.
-    pub omissions: Vec<Omission>,
-    /// Update policy; null for a still scene.
-    pub motion: Option<MotionChoice>,
-    /// From which number of items and shares on another structure is faster.
-    pub changes: Vec<Change>,
-}
-
-impl Advice {
-    /// Returns `true` if a structure or a side of a rule gave a wrong answer.
-    pub fn found_wrong_answers(&self) -> bool {
-        let mut structures = self.structure.rows.iter();
-        structures.any(|row| row.status.is_failure())
-            || self.omissions.iter().any(Omission::is_wrong)
-    }
-}
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -181,30 +149,25 @@ impl Prepared {
         let of_stages: Vec<ProcessTimes> = of_stages.collect();
         let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
         let motion = (self.motion).map(|motion| motion.chosen(&self.structure, here));
-        let facts = Facts {
-            draw_ns: input.draw_ns,
-            structure: &self.structure,
-            test: &test,
-            motion: motion.as_ref(),
-            changes: &changes,
-            funnel: &funnel,
-        };
-        let rules = self.entered.rules.into_iter();
-        let settled = rules.map(|(rule, draft)| {
-            let check = draft.sides.map(|sides| sides.check(answered, &times));
-            let finding = (draft.conclude)(&facts, check.as_ref());
-            rule.omission(finding, check)
-        });
-        Advice {
+        let mut advice = Advice {
             draw_ns: input.draw_ns,
             processes: processes.len(),
             twin: times.ratio(self.entered.twin, BASE),
-            omissions: settled.collect(),
+            omissions: Vec::new(),
             test,
             motion,
             structure: self.structure,
             changes,
-        }
+            funnel,
+        };
+        let rules = self.entered.rules.into_iter();
+        let settled = rules.map(|(rule, draft)| {
+            let check = draft.sides.map(|sides| sides.check(answered, &times));
+            let finding = (draft.conclude)(&advice, check.as_ref());
+            rule.omission(finding, check)
+        });
+        advice.omissions = settled.collect();
+        advice
     }
 }
 

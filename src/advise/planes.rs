@@ -26,9 +26,9 @@ const MOST_NEEDED: f64 = 0.99;
 /// The far plane first of all, which paths often put behind the scene.
 pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
-    let bounds = &case.scene().bounds;
+    let bounds = &case.workload.scene.bounds;
     let (mut needed, mut all) = (0, 0);
-    let mut fewer = Vec::with_capacity(case.cameras());
+    let mut fewer = Vec::with_capacity(case.workload.views.len());
     for volume in case.volumes() {
         let left = without_needless(volume, bounds);
         all += volume.planes().len();
@@ -70,7 +70,7 @@ const COUNTED: usize = 64;
 pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
-    let input = Input::new(&case.scene().items);
+    let input = Input::new(&case.workload.scene.items);
     let tree = Rc::new(Wide::build(&input, &Default::default())?);
     let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
     let step = volumes.len().div_ceil(COUNTED).max(1);
@@ -94,8 +94,8 @@ pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     });
     let left_out = trials.enter(true, move |n, out| see(kernel, &tree, &volumes[n], out));
     let sides = Sides::new(Wide::INFO.name, kept, left_out);
-    Ok(Draft::concluded(sides, |facts, _| {
-        match facts.structure.is_scan() {
+    Ok(Draft::concluded(sides, |advice, _| {
+        match advice.structure.is_scan() {
             true => Finding::none(NO_NODES),
             false => finding,
         }
@@ -152,7 +152,7 @@ impl QueryVolume for Unmasked<'_> {
 pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
-    Ok(Draft::concluded(sides, move |facts, check| {
+    Ok(Draft::concluded(sides, move |advice, check| {
         let sides = check.map(|check| [&check.kept, &check.left_out]);
         let more = sides.and_then(|[exact, six]| {
             Some(six.false_positives_per_query? - exact.false_positives_per_query?)
@@ -160,10 +160,10 @@ pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
         let Some(([exact, six], more)) = sides.zip(more) else {
             return Finding::none("no camera was judged");
         };
-        let draw_ns = facts.draw_ns;
+        let draw_ns = advice.draw_ns;
         let reason = format!("with {draw_ns} ns/item drawn");
         let finding = Finding::new(more * draw_ns, exact.ns - six.ns, reason);
-        following(finding, facts.test)
+        following(finding, &advice.test)
     }))
 }
 
@@ -220,7 +220,7 @@ fn of_margin(margin: f64) -> Finding {
 /// centre, the other about the world's origin.
 pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
-    let scene = case.scene();
+    let scene = case.workload.scene;
     if case.workload.around != scene.surroundings() {
         bail!("a motion that leaves the scene");
     }

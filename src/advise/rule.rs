@@ -1,5 +1,5 @@
 //! A rule of omission: its declaration, both sides as tasks, and the omission that
-//! follows from the facts.
+//! follows from the rest of the advice.
 
 use serde::Serialize;
 
@@ -7,6 +7,7 @@ use super::change::Change;
 use super::choice::{MotionChoice, StructureChoice, TestChoice};
 use super::trials::{By, Check, Decision, Sides, Trials, is_longer, of_costs};
 use crate::funnel::FunnelReport;
+use crate::statistics::Estimate;
 
 /// A row of the table of rules.
 #[derive(Debug, Serialize)]
@@ -27,19 +28,41 @@ pub struct Rule {
     pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
 }
 
-/// Facts of all rules.
-pub struct Facts<'f> {
+/// Structure, test and features to leave out, with the evidence.
+#[derive(Clone, Debug, Serialize)]
+pub struct Advice {
     /// Cost of drawing an item that is not visible, ns.
     pub draw_ns: f64,
-    pub structure: &'f StructureChoice,
-    pub test: &'f TestChoice,
-    pub motion: Option<&'f MotionChoice>,
-    pub changes: &'f [Change],
+    /// Number of timed processes; an interval needs three or more.
+    pub processes: usize,
+    /// A/A check: time of the fastest tree, entered a second time, / its own time; the
+    /// interval contains 1.
+    pub twin: Option<Estimate>,
+    /// The structure to take.
+    pub structure: StructureChoice,
+    /// The culling test to take.
+    pub test: TestChoice,
+    /// One omission per rule, which follows from all the rest.
+    pub omissions: Vec<Omission>,
+    /// Update policy; null for a still scene.
+    pub motion: Option<MotionChoice>,
+    /// From which number of items and shares on another structure is faster.
+    pub changes: Vec<Change>,
     /// The funnel of a few views, or the reason for which there is none.
-    pub funnel: &'f Result<FunnelReport, String>,
+    #[serde(skip)]
+    pub(super) funnel: Result<FunnelReport, String>,
 }
 
-/// Statistic, threshold and reason of a rule, from the facts.
+impl Advice {
+    /// Returns `true` if a structure or a side of a rule gave a wrong answer.
+    pub fn found_wrong_answers(&self) -> bool {
+        let mut structures = self.structure.rows.iter();
+        structures.any(|row| row.status.is_failure())
+            || self.omissions.iter().any(Omission::is_wrong)
+    }
+}
+
+/// Statistic, threshold and reason of a rule, from the advice so far.
 #[derive(Clone, Default)]
 pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
@@ -74,8 +97,8 @@ impl Finding {
     }
 }
 
-/// Maker of a finding, from the facts and the rule's own measurement.
-type Conclude = dyn FnOnce(&Facts, Option<&Check>) -> Finding;
+/// Maker of a finding, from the advice so far and the rule's own measurement.
+type Conclude = dyn FnOnce(&Advice, Option<&Check>) -> Finding;
 
 /// A rule with its tasks entered, before its times.
 pub struct Draft {
@@ -89,10 +112,10 @@ impl Draft {
         Draft::concluded(sides, move |_, _| finding)
     }
 
-    /// A finding from the facts and the rule's own measurement.
+    /// A finding from the advice so far and the rule's own measurement.
     pub fn concluded(
         sides: impl Into<Option<Sides>>,
-        conclude: impl FnOnce(&Facts, Option<&Check>) -> Finding + 'static,
+        conclude: impl FnOnce(&Advice, Option<&Check>) -> Finding + 'static,
     ) -> Draft {
         Draft {
             sides: sides.into(),

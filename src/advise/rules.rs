@@ -61,13 +61,13 @@ pub(super) const RULES: &[Rule] = rows! {
 fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
-    let items = &case.scene().items;
+    let items = &case.workload.scene.items;
     let whole = trials.index(case.scan.build(items)?, &case.workload.views[..]);
     let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
     let sides = Sides::new(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
-    Ok(Draft::concluded(sides, move |facts, check| {
-        let taken = facts.structure;
+    Ok(Draft::concluded(sides, move |advice, check| {
+        let taken = &advice.structure;
         // Follows the structure taken, wherever there was a choice.
         let [tree, fastest] = taken.tree_and_scan();
         let both = tree.zip(fastest);
@@ -75,7 +75,7 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let ratio = both.and_then(|(tree, scan)| over(tree, scan));
         let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
         let alone = check.filter(|_| costs.is_none());
-        let change = facts.changes.iter().find(|c| c.axis == Axis::Items);
+        let change = advice.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
         // Smaller parts are not measured once another structure is ahead.
         let least = below.map(|turn| turn.upper);
@@ -116,7 +116,7 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
 /// leaves are wide. Bounds stay three-dimensional either way.
 fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
-    let (scene, by) = (case.scene(), case.spec.execution);
+    let (scene, by) = (case.workload.scene, case.spec.execution);
     let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
@@ -127,14 +127,14 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
         .map(|index| trials.index(index, &case.workload.views[..]));
     let sides = Sides::new("octree against quadtree", kept, left_out);
-    Ok(Draft::concluded(sides, move |facts, _| {
-        if facts.structure.is_scan() {
+    Ok(Draft::concluded(sides, move |advice, _| {
+        if advice.structure.is_scan() {
             return Finding::none(NO_NODES);
         }
-        let taken = facts.structure.name.as_deref().unwrap_or_default();
+        let taken = advice.structure.name.as_deref().unwrap_or_default();
         let flat = taken.starts_with("quadtree");
         let is_either = flat || taken.starts_with("octree");
-        let is_either = is_either && facts.structure.ties.is_empty();
+        let is_either = is_either && advice.structure.ties.is_empty();
         Finding {
             leaves_out: is_either.then_some(flat),
             ..Finding::new(height, cell, "octree against quadtree")
@@ -146,8 +146,8 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
 ///
 /// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly.
 fn rebuild() -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, |facts, _| {
-        let Some(motion) = facts.motion else {
+    Ok(Draft::concluded(None, |advice, _| {
+        let Some(motion) = &advice.motion else {
             return Finding::none("nothing moves without --motion");
         };
         let cell = |policy| {
@@ -222,9 +222,9 @@ const SHADE_NS: f64 = 1.0;
 
 /// A rule about a stage; where the funnel has none it does not apply, for a reason.
 fn reads(stage: StageKind) -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, move |facts, _| {
-        let funnel = facts.funnel.as_ref().map_err(String::clone);
-        let found = funnel.and_then(|funnel| finding(funnel, stage, facts.draw_ns));
+    Ok(Draft::concluded(None, move |advice, _| {
+        let funnel = advice.funnel.as_ref().map_err(String::clone);
+        let found = funnel.and_then(|funnel| finding(funnel, stage, advice.draw_ns));
         found.unwrap_or_else(Finding::none)
     }))
 }

@@ -75,12 +75,12 @@ impl<'c> Trials<'c> {
         let answered = self.asks.iter().map(|(ask, is_judged)| {
             let mut errors = is_judged.then(Vec::new);
             let mut truths = truths.iter().peekable();
-            let answers = (0..self.case.cameras()).map(|camera| {
+            let answers = (0..self.case.workload.views.len()).map(|camera| {
                 out.clear();
                 ask(camera, &mut out);
                 let truth = truths.next_if(|(judged, _)| *judged == camera);
                 if let (Some(errors), Some((_, truth))) = (&mut errors, truth) {
-                    errors.push(truth.errors(&self.case.scene().items, &out));
+                    errors.push(truth.errors(&self.case.workload.scene.items, &out));
                 }
                 Answer::of(&out)
             });

@@ -272,6 +272,15 @@ impl Surfaces {
 }
 
 impl Scene {
+    /// Shape of the items.
+    pub fn item_shape(&self) -> ItemShape {
+        match (&self.surfaces, &self.regions) {
+            (Some(_), _) => ItemShape::Mesh,
+            (None, Regions::Bsp(_)) => ItemShape::Wall,
+            (None, _) => ItemShape::Box,
+        }
+    }
+
     /// The same triangles, an item each, with the labels of their items.
     ///
     /// # Errors
@@ -350,17 +359,6 @@ named! {
         Wall = "walls",
         /// Triangles: [`Scene::surfaces`].
         Mesh = "triangles",
-    }
-}
-
-impl Scene {
-    /// Shape of the items.
-    pub fn item_shape(&self) -> ItemShape {
-        match (&self.surfaces, &self.regions) {
-            (Some(_), _) => ItemShape::Mesh,
-            (None, Regions::Bsp(_)) => ItemShape::Wall,
-            (None, _) => ItemShape::Box,
-        }
     }
 }
 

@@ -179,25 +179,7 @@ impl Scene {
             _ => &self.originals,
         }
     }
-}
 
-/// The sign of `(p - origin) - bound`, exactly: -1, 0 or 1.
-fn side(p: f64, origin: f64, bound: f32) -> i32 {
-    let (difference, lost) = two_sum(p, -origin);
-    let bound = f64::from(bound);
-    // The rounded difference is on the true one's side of any double.
-    if difference != bound {
-        return if difference > bound { 1 } else { -1 };
-    }
-    i32::from(lost > 0.0) - i32::from(lost < 0.0)
-}
-
-/// `Vec::retain` of the ids from `first` on.
-fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> bool) {
-    ids.extract_if(first.., |id| !keep(*id)).for_each(drop);
-}
-
-impl Scene {
     /// The items as they were written, world coordinates. Exact: where no
     /// original is kept, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
@@ -236,6 +218,22 @@ impl Scene {
             ..Scene::from_boxes(self.name, &boxes)?
         })
     }
+}
+
+/// The sign of `(p - origin) - bound`, exactly: -1, 0 or 1.
+fn side(p: f64, origin: f64, bound: f32) -> i32 {
+    let (difference, lost) = two_sum(p, -origin);
+    let bound = f64::from(bound);
+    // The rounded difference is on the true one's side of any double.
+    if difference != bound {
+        return if difference > bound { 1 } else { -1 };
+    }
+    i32::from(lost > 0.0) - i32::from(lost < 0.0)
+}
+
+/// `Vec::retain` of the ids from `first` on.
+fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> bool) {
+    ids.extract_if(first.., |id| !keep(*id)).for_each(drop);
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, mix64};
+use crate::spec::values::choice;
 use crate::spec::{Spec, SpecError};
 use crate::visibility::truth::{Along, Crossing, Probe};
 
@@ -105,10 +106,7 @@ impl CutOuts {
     /// A mask or a parameter that is not known, a value out of range.
     pub fn parse(text: &str) -> Result<CutOuts, SpecError> {
         let mut spec = Spec::parse(text)?;
-        let Some(&(mask, ..)) = MASKS.iter().find(|(_, name, _)| *name == spec.name()) else {
-            let names = MASKS.iter().map(|(_, name, _)| *name);
-            return Err(SpecError::unknown("mask", spec.name(), names));
-        };
+        let mask = choice("mask", &MASKS)(spec.name())?;
         let share = spec.number("share", 0.2)?;
         if !(share > 0.0 && share <= 1.0) {
             let typed = spec.text("share").unwrap_or_default();

@@ -84,12 +84,6 @@ impl<B: Body> BodyIndex<B> {
         B::probe(ray, self.tree.zero)
     }
 
-    /// The body at a place in tree order.
-    #[inline(always)]
-    pub fn body(&self, place: u32) -> &B {
-        &self.bodies[place as usize].0
-    }
-
     /// Shows each body that a ray may meet to a visitor, nearest nodes first.
     #[inline]
     pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
@@ -157,13 +151,13 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
         let Walk(of, ray, visitor) = self;
         let Some(slabs) = Slabs::of(ray, of.tree.zero, of.tree.bounds.reach()) else {
             return of.tree.search_in_f64(ray, |place| {
-                visitor.visit(of.body(place));
+                visitor.visit(&of.bodies[place as usize].0);
             });
         };
         let mut limit = f64::INFINITY;
         let mut bound = slabs.far;
         of.tree.search(isa, &slabs, |place| {
-            let latest = visitor.visit(of.body(place));
+            let latest = visitor.visit(&of.bodies[place as usize].0);
             if latest < limit {
                 limit = latest;
                 bound = bound.min(above(limit));

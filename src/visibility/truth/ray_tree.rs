@@ -31,6 +31,50 @@ pub struct RayTree {
 }
 
 impl RayTree {
+    /// Builds the tree over boxes relative to a zero. O(n log n).
+    ///
+    /// Returns their ids in tree order; searches offer positions in these.
+    pub fn of(boxes: &[Aabb], zero: DVec3) -> (RayTree, Vec<ItemId>) {
+        let mut items = Record::numbered(boxes);
+        let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
+        let mut root = Child::new(0, 0);
+        // Nodes and lanes that the number of the node goes to.
+        let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
+        if !items.is_empty() {
+            open.push((Part::of(&items, 0..items.len()), None));
+        }
+        while let Some((part, above)) = open.pop() {
+            let at = nodes.len();
+            let mut parts = cut(&mut items, part);
+            parts.sort_by_key(|part| part.len() > 1);
+            let single = parts.iter().filter(|part| part.len() == 1).count();
+            let child = Child::new(at, single);
+            match above {
+                None => root = child,
+                Some((node, lane)) => nodes[node].children[lane] = child.0,
+            }
+            let mut node = Node {
+                boxes: BoxBlock::EMPTY,
+                children: [0; LANES],
+            };
+            for (lane, part) in parts.iter().enumerate() {
+                node.boxes.set(lane, &part.bounds);
+                node.children[lane] = part.range.start as u32;
+            }
+            nodes.push(node);
+            for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
+                open.push((part, Some((at, lane))));
+            }
+        }
+        let tree = RayTree {
+            nodes,
+            root,
+            zero,
+            bounds: Aabb::union_of(boxes),
+        };
+        (tree, items.iter().map(|item| item.id).collect())
+    }
+
     /// Offers the place of every item that the ray does not certainly miss, in f64.
     ///
     /// All bodies along the ray, whatever their depth: the slab tests do not cover it.
@@ -220,52 +264,6 @@ impl Child {
     #[inline(always)]
     fn items(self) -> LaneMask {
         ((1u32 << (self.0 & 31)) - 1) as LaneMask
-    }
-}
-
-impl RayTree {
-    /// Builds the tree over boxes relative to a zero. O(n log n).
-    ///
-    /// Returns their ids in tree order; searches offer positions in these.
-    pub fn of(boxes: &[Aabb], zero: DVec3) -> (RayTree, Vec<ItemId>) {
-        let mut items = Record::numbered(boxes);
-        let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
-        let mut root = Child::new(0, 0);
-        // Nodes and lanes that the number of the node goes to.
-        let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
-        if !items.is_empty() {
-            open.push((Part::of(&items, 0..items.len()), None));
-        }
-        while let Some((part, above)) = open.pop() {
-            let at = nodes.len();
-            let mut parts = cut(&mut items, part);
-            parts.sort_by_key(|part| part.len() > 1);
-            let single = parts.iter().filter(|part| part.len() == 1).count();
-            let child = Child::new(at, single);
-            match above {
-                None => root = child,
-                Some((node, lane)) => nodes[node].children[lane] = child.0,
-            }
-            let mut node = Node {
-                boxes: BoxBlock::EMPTY,
-                children: [0; LANES],
-            };
-            for (lane, part) in parts.iter().enumerate() {
-                node.boxes.set(lane, &part.bounds);
-                node.children[lane] = part.range.start as u32;
-            }
-            nodes.push(node);
-            for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
-                open.push((part, Some((at, lane))));
-            }
-        }
-        let tree = RayTree {
-            nodes,
-            root,
-            zero,
-            bounds: Aabb::union_of(boxes),
-        };
-        (tree, items.iter().map(|item| item.id).collect())
     }
 }
 

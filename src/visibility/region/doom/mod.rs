@@ -107,6 +107,39 @@ impl DoomMap {
     pub fn reject(&self) -> Option<Pvs> {
         Pvs::from_reject(&self.file.reject, self.sectors.len())
     }
+
+    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
+    /// all heights.
+    ///
+    /// # Errors
+    /// A place about which the linedefs disagree: what is open to what is not known then.
+    pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
+        if let Some(dispute) = self.file.disputes().first() {
+            return Err(*dispute);
+        }
+        let opening = |line: &Linedef| {
+            let [low, high] = self.opening(line)?;
+            let [front, behind] = [line.sectors[0]?, line.sectors[1]?];
+            let [from, to] = line.ends.map(plan);
+            let corners = [(from, low), (to, low), (to, high), (from, high)];
+            let corners = corners.map(|(at, z)| at.extend(z));
+            (front != behind).then_some(Opening {
+                sides: [front, behind],
+                corners,
+                plane: OpeningPlane::Upright { from, to },
+            })
+        };
+        let openings = self.lines.iter().filter_map(opening).collect();
+        // Boxes about the leaves of the map's own tree, without a height.
+        let all_heights = DVec3::Z * (2.0 * HIGHEST);
+        let mut parts = vec![Vec::new(); self.sectors.len()];
+        for (&sector, b) in self.file.leaf_sectors.iter().zip(&self.file.tree.boxes) {
+            let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+            parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
+        }
+        let ground = Arc::new(SectorGround::new(self.clone()));
+        Ok(RegionGraph::new(parts, openings, ground))
+    }
 }
 
 /// The ground of a map.
@@ -165,41 +198,6 @@ fn meets(line: &Linedef, b: &WorldBox) -> bool {
     // Rounding of the side is below this: |d| and distances are below 2^18.
     let slack = 1e-4;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
-}
-
-impl DoomMap {
-    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
-    /// all heights.
-    ///
-    /// # Errors
-    /// A place about which the linedefs disagree: what is open to what is not known then.
-    pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
-        if let Some(dispute) = self.file.disputes().first() {
-            return Err(*dispute);
-        }
-        let opening = |line: &Linedef| {
-            let [low, high] = self.opening(line)?;
-            let [front, behind] = [line.sectors[0]?, line.sectors[1]?];
-            let [from, to] = line.ends.map(plan);
-            let corners = [(from, low), (to, low), (to, high), (from, high)];
-            let corners = corners.map(|(at, z)| at.extend(z));
-            (front != behind).then_some(Opening {
-                sides: [front, behind],
-                corners,
-                plane: OpeningPlane::Upright { from, to },
-            })
-        };
-        let openings = self.lines.iter().filter_map(opening).collect();
-        // Boxes about the leaves of the map's own tree, without a height.
-        let all_heights = DVec3::Z * (2.0 * HIGHEST);
-        let mut parts = vec![Vec::new(); self.sectors.len()];
-        for (&sector, b) in self.file.leaf_sectors.iter().zip(&self.file.tree.boxes) {
-            let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
-            parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
-        }
-        let ground = Arc::new(SectorGround::new(self.clone()));
-        Ok(RegionGraph::new(parts, openings, ground))
-    }
 }
 
 /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
