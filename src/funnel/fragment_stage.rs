@@ -5,6 +5,8 @@
 use std::cell::RefCell;
 use std::collections::HashSet;
 
+use glam::DVec3;
+
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
 use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z, default_test};
@@ -115,7 +117,12 @@ impl<'w> FragmentStage<'w> {
         let (rays, grid) = (self.world.rays(view), self.world.samples);
         match &self.left {
             Left::Boxes(views, image) => {
-                let new = || (Canvas::of(rays, grid), Drawn::new(grid.samples()));
+                let new = || {
+                    (
+                        Canvas::about(rays, grid, DVec3::ZERO),
+                        Drawn::new(grid.samples()),
+                    )
+                };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays);

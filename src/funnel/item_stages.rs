@@ -89,20 +89,14 @@ pub struct ItemStages<'w> {
 }
 
 impl<'w> ItemStages<'w> {
-    /// Runs stages one after the other; what they leave remains.
-    pub fn of(world: &'w World<'w>, steps: &[Step]) -> ItemStages<'w> {
-        let mut stages = ItemStages {
-            world,
-            steps: steps.to_vec(),
-            left: Vec::new(),
-        };
-        stages.run(steps);
-        stages
-    }
-
     /// Runs a chain, which leaves what remains, and all chains with one other stage.
     pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
-        let mut all = ItemStages::of(world, &chain.steps());
+        let mut all = ItemStages {
+            world,
+            steps: chain.steps(),
+            left: Vec::new(),
+        };
+        all.run(&chain.steps());
         for stage in StageKind::OF_ITEMS {
             for (_, name) in world.rows(stage) {
                 all.run(&chain.steps_with(stage, &name));

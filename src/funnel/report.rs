@@ -220,8 +220,8 @@ impl Gain {
     pub(super) fn set(&mut self, times: &OverProcesses<FunnelKey>) {
         let [with, without] = self.tasks.each_ref().map(|tasks| sums(times, tasks));
         (self.with_ns, self.without_ns) = (centre(&with), centre(&without));
-        let [own, other] = [&with, &without].map(|ns| ns.iter().map(|ns| ns.ln()).collect());
-        let (own, other): (Vec<f64>, Vec<f64>) = (own, other);
+        let logs = |ns: &[f64]| -> Vec<f64> { ns.iter().map(|ns| ns.ln()).collect() };
+        let [own, other] = [logs(&with), logs(&without)];
         self.ratio = ratio(&other, &own, &other);
         let removed = self.removed();
         if removed > 0.0 {

@@ -225,7 +225,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         level: Level::of(&scene.name, scene, &input.loading)?,
         cut_outs: cut_outs.map(|(typed, made)| CutOutRow {
             typed: *typed,
-            item_count: made.count(),
+            item_count: made.of_item.iter().flatten().count(),
         }),
         chain: input.chain.clone(),
         gains,

@@ -99,10 +99,8 @@ impl Family {
     /// # Errors
     /// A parameter that is unknown or out of range.
     pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene> {
-        let n = match self.build {
-            Boxes(_) | Rooms(_) => spec.whole("n", COUNT, 0..=MOST)?,
-            Mesh(_) => spec.whole("n", COUNT, 1..=MOST)?,
-        };
+        let least = u64::from(matches!(self.build, Mesh(_)));
+        let n = spec.whole("n", COUNT, least..=MOST)?;
         let seed = spec.whole("seed", 1, 0..=u64::MAX)?;
         let offset = spec.number("offset", 0.0)?;
         let mut world = match self.build {

@@ -61,9 +61,7 @@ pub(crate) use rng::mix64;
 pub use rooms::{Portal, Tiling};
 pub use samples::{FETCHED, Fetched, NOTICE, SAMPLES, Sample};
 pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
-#[cfg(feature = "cli")]
-pub(crate) use surface::volume_within;
-pub use surface::{ItemShape, SurfaceKind, Surfaces};
+pub use surface::{ItemShape, SurfaceKind, Surfaces, volume_within};
 pub use wad::{WadMap, map_names};
 pub use written::{Originals, Sought, SoughtBox};
 #[cfg(test)]

@@ -11,7 +11,6 @@ use glam::{DVec3, Vec3};
 use super::{Labels, LoadOptions, Regions, Scene, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::Result;
-use crate::query::ItemId;
 use crate::spec::SpecError;
 
 named! {
@@ -93,37 +92,22 @@ impl Surfaces {
         all
     }
 
-    /// Some of the items, renumbered in this order.
+    /// The opaque, one-sided triangles of an item, as the only item.
     ///
     /// # Panics
     /// If there is no such item.
-    pub fn some(&self, items: &[ItemId]) -> Surfaces {
-        let mut some = Surfaces::about(self.origin);
-        for item in items.iter().map(|&id| id as usize) {
-            let range = self.range(item);
-            let triangles = &self.triangles[range.clone()];
-            let own = triangles.iter().flatten().copied();
-            let (first, end) = own.fold((u32::MAX, 0), |(low, high), p| {
-                (low.min(p), high.max(p + 1))
-            });
-            let points = &self.points[first.min(end) as usize..end as usize];
-            let triangles = triangles.iter().map(|corners| corners.map(|p| p - first));
-            let triangles: Vec<[u32; 3]> = triangles.collect();
-            some.push(SurfaceKind::Opaque, false, points, &triangles);
-            some.set_last(&self.kinds[range.clone()], &self.two_sided[range]);
-        }
-        some
-    }
-
-    /// The opaque, one-sided triangles of an item, as the only item.
     pub fn solid_part(&self, item: usize) -> Surfaces {
-        let whole = self.some(&[item as ItemId]);
-        let facts = whole.kinds.iter().zip(&whole.two_sided);
-        let solid = whole.triangles.iter().zip(facts);
-        let solid = solid.filter(|(_, fact)| *fact == (&SurfaceKind::Opaque, &false));
-        let triangles: Vec<[u32; 3]> = solid.map(|(corners, _)| *corners).collect();
+        let range = self.range(item);
+        let own = self.triangles[range.clone()].as_flattened();
+        let first = own.iter().min().map_or(0, |first| *first);
+        let end = own.iter().max().map_or(0, |last| last + 1);
+        let is_solid = |at: &usize| self.kinds[*at] == SurfaceKind::Opaque && !self.two_sided[*at];
+        let solid = range.filter(is_solid);
+        let triangles = solid.map(|at| self.triangles[at].map(|p| p - first));
+        let triangles: Vec<[u32; 3]> = triangles.collect();
+        let points = &self.points[first as usize..end as usize];
         let mut part = Surfaces::about(self.origin);
-        part.push(SurfaceKind::Opaque, false, &whole.points, &triangles);
+        part.push(SurfaceKind::Opaque, false, points, &triangles);
         part
     }
 
@@ -258,12 +242,6 @@ impl Surfaces {
         runs.filter(|run| !matched(run)).map(<[_]>::len).sum()
     }
 
-    /// Volume of an item, cubic world units, rounded: positive where a closed
-    /// surface is wound outward.
-    pub fn volume(&self, item: usize) -> f64 {
-        volume_within(self.of(item))
-    }
-
     /// The triangles of an item as a range of indices.
     pub(crate) fn range(&self, item: usize) -> Range<usize> {
         let range = &self.of_item[item];
@@ -336,8 +314,10 @@ pub(super) fn own_points(points: &[DVec3], triangles: &mut [[u32; 3]]) -> Vec<DV
     own
 }
 
-/// Volume within a closed surface, rounded: see [`Surfaces::volume`].
-pub(crate) fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
+/// Volume within a closed surface, cubic world units, rounded.
+///
+/// Positive where it is wound outward.
+pub fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
     let mut triangles = triangles.peekable();
     let Some(&[zero, ..]) = triangles.peek() else {
         return 0.0;
@@ -375,17 +355,22 @@ mod tests {
             scene.items.iter().for_each(push);
             all
         }
+
+        /// Volume of an item, as [`volume_within`] its surface.
+        pub fn volume(&self, item: usize) -> f64 {
+            volume_within(self.of(item))
+        }
     }
 
     #[test]
-    fn some_items_of_a_mesh_keep_their_triangles() {
+    fn the_solid_part_of_a_solid_item_has_all_of_its_triangles() {
         let scene = load("mesh:spheres:n=5k", &Default::default()).unwrap();
         let mesh = scene.surfaces.as_ref().unwrap();
-        let some = mesh.some(&[2, 0]);
-        assert_eq!(some.items(), 2);
-        for (place, item) in [(0, 2), (1, 0)] {
-            assert!(some.of(place).eq(mesh.of(item)));
-            assert_eq!(some.open_edges(place), 0);
+        for item in [2, 0] {
+            let part = mesh.solid_part(item);
+            assert_eq!(part.items(), 1);
+            assert!(part.of(0).eq(mesh.of(item)));
+            assert_eq!(part.open_edges(0), 0);
         }
     }
 

@@ -202,7 +202,8 @@ pub struct Canvas<B: Body = SolidBox> {
     pub screen: Screen,
     /// Zero of the bodies' local coordinates.
     pub(super) origin: DVec3,
-    probes: Vec<B::Probe>,
+    /// The ray of each sample.
+    pub(super) probes: Vec<B::Probe>,
 }
 
 impl<B: Body> Canvas<B> {
@@ -232,12 +233,6 @@ impl<B: Body> Canvas<B> {
         self.screen.grid
     }
 
-    /// The ray of a sample.
-    #[inline]
-    pub fn probe(&self, sample: usize) -> &B::Probe {
-        &self.probes[sample]
-    }
-
     /// Calls `visit` with each sample of a rectangle that the stencil lets through.
     ///
     /// Returns how many these are, and how many the stencil kept out.
@@ -261,12 +256,5 @@ impl<B: Body> Canvas<B> {
             }
         }
         [tested, kept_out]
-    }
-}
-
-impl Canvas {
-    /// The rays of a camera through the samples of a grid, for boxes.
-    pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
-        Canvas::about(rays, grid, DVec3::ZERO)
     }
 }

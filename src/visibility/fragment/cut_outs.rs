@@ -58,22 +58,11 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// Number of cut-outs.
-    pub fn count(&self) -> usize {
-        self.of_item.iter().flatten().count()
-    }
-
-    /// The surface of an item, `None` if it is solid.
-    #[inline]
-    pub fn of(&self, item: ItemId) -> Option<&Surface> {
-        self.of_item.get(item as usize)?.as_ref()
-    }
-
     /// Tests whether an item is opaque where a ray enters it. The place on the face is
     /// that of the rounded depth, counted from the box's lower corner along the
     /// two axes of the face, in the order x, y, z.
     pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
-        let Some(surface) = self.of(item) else {
+        let Some(Some(surface)) = self.of_item.get(item as usize) else {
             return true;
         };
         let place = (probe.ray().at(at.depth) - b.min) / surface.tile;
@@ -185,7 +174,7 @@ mod tests {
         assert_eq!(opaque(2.0), Mask::Fence.opaque(1.0, 0.5));
         assert_eq!(opaque(18.0), Mask::Fence.opaque(2.0 / 18.0, 1.0 / 18.0));
         assert!(opaque(2.0) && !opaque(18.0));
-        assert!(surfaces.of(0).is_none());
+        assert!(surfaces.of_item[0].is_none());
     }
 
     #[test]
@@ -193,18 +182,22 @@ mod tests {
         let typed = CutOuts::parse("foliage:share=50%,tile=2,seed=7").unwrap();
         assert_eq!((typed.mask, typed.share), (Mask::Foliage, 0.5));
         let surfaces = typed.holes(1000, |item| item % 2 == 0);
-        let cut: Vec<ItemId> = (0..1000).filter(|i| surfaces.of(*i).is_some()).collect();
+        let cut: Vec<ItemId> = (0..1000)
+            .filter(|i| surfaces.of_item[*i as usize].is_some())
+            .collect();
         assert!(cut.iter().all(|item| item % 2 == 0));
         assert!((200..300).contains(&cut.len()), "{}", cut.len());
-        let tile = surfaces.of(cut[0]).map(|surface| surface.tile);
+        let tile = surfaces.of_item[cut[0] as usize].map(|surface| surface.tile);
         assert_eq!(tile, Some(2.0));
         let fence = CutOuts::parse("fence").unwrap();
         assert_eq!((fence.share, fence.tile, fence.seed), (0.2, 1.0, 1));
         let whole = CutOuts::parse("fence:share=1").unwrap();
         let all = whole.holes(50, |_| true);
-        assert!((0..50).all(|item| all.of(item).is_some()));
+        assert!((0..50).all(|item| all.of_item[item].is_some()));
         let other = CutOuts { seed: 8, ..typed }.holes(1000, |item| item % 2 == 0);
-        assert!((0..1000).any(|item| other.of(item).is_some() != surfaces.of(item).is_some()));
+        assert!(
+            (0..1000).any(|item| other.of_item[item].is_some() != surfaces.of_item[item].is_some())
+        );
     }
 
     #[test]

@@ -81,7 +81,7 @@ pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
     pub tally: Tally,
     /// The exact front of each sample, of opaque items; of a tie the lowest id.
-    front: Vec<Option<(B::At, ItemId)>>,
+    pub(super) front: Vec<Option<(B::At, ItemId)>>,
     /// Fragments that were as near as the one in front, and lost by their id.
     ties: Vec<Fragment<B::At>>,
     /// Items of triangles that hide nothing and are met before the front or with it.
@@ -133,7 +133,7 @@ impl<B: Drawable> Drawn<B> {
                 let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
                 let passes = match body.hides() {
                     true => self.test(probe, Fragment { sample, item, at }),
-                    false => self.front(sample).is_none_or(is_before),
+                    false => self.front[sample].is_none_or(is_before),
                 };
                 self.tally.shaded_count += u64::from(passes);
                 if passes && !body.hides() && self.before.last() != Some(&item) {
@@ -176,12 +176,6 @@ impl<B: Drawable> Drawn<B> {
         true
     }
 
-    /// The front item of a sample, and where its ray meets it.
-    #[inline]
-    pub fn front(&self, sample: usize) -> Option<(B::At, ItemId)> {
-        self.front[sample]
-    }
-
     /// The exact visible set of the samples, ascending.
     ///
     /// All items that are in front anywhere, every item of a tie, and the items before them
@@ -189,7 +183,7 @@ impl<B: Drawable> Drawn<B> {
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
         let in_front = |tie: &&Fragment<B::At>| {
             let front = self.front[tie.sample];
-            let order = |front: (B::At, _)| canvas.probe(tie.sample).compare(&tie.at, &front.0);
+            let order = |front: (B::At, _)| canvas.probes[tie.sample].compare(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
         };
         let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);
@@ -212,7 +206,7 @@ impl Drawn {
             let [asked, _] = canvas.scan(place, None, |sample, probe| {
                 let is_before = |at| {
                     let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
-                    self.front(sample).is_none_or(before)
+                    self.front[sample].is_none_or(before)
                 };
                 let entered = probe.enter(rectangle, probe.ray().far);
                 marked[sample] |= entered.is_some_and(is_before);

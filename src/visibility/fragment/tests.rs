@@ -11,6 +11,13 @@ use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::truth::{Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, judge};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
+impl Canvas {
+    /// The rays of a camera through the samples of a grid, for boxes.
+    pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
+        Canvas::about(rays, grid, DVec3::ZERO)
+    }
+}
+
 fn all(solids: &Solids) -> Vec<SolidBox> {
     Boxes::of(solids).all
 }

@@ -24,11 +24,6 @@ impl Grid {
         Grid { cells, low, step }
     }
 
-    /// The cells inside the surface. O(t + cells³), and more where triangles are long.
-    pub fn cells(&self, part: &[[Vec3; 3]]) -> Cells {
-        Cells::new(self.cells, self.inside(&self.touched(part)))
-    }
-
     /// Lower corner of a cell, scene-local.
     pub fn corner(&self, cell: [usize; 3]) -> Vec3 {
         let [x, y, z] = cell.map(|index| index as f64);
@@ -65,9 +60,11 @@ impl Grid {
         touched
     }
 
-    /// Cells that no path from the sides reaches without a touched cell.
-    fn inside(&self, touched: &[u64]) -> Vec<u64> {
-        let n = self.cells;
+    /// The cells inside the surface. O(t + cells³), and more where triangles are long.
+    ///
+    /// No path from the sides reaches them without a touched cell.
+    pub fn cells(&self, part: &[[Vec3; 3]]) -> Cells {
+        let (n, touched) = (self.cells, self.touched(part));
         let row = u64::MAX >> (64 - n);
         let ends = 1 | 1 << (n - 1);
         let free: Vec<u64> = touched.iter().map(|touched| row & !touched).collect();
@@ -94,7 +91,8 @@ impl Grid {
             }
         }
         let rows = free.iter().zip(&outside);
-        rows.map(|(free, outside)| free & !outside).collect()
+        let inside = rows.map(|(free, outside)| free & !outside);
+        Cells::new(n, inside.collect())
     }
 }
 

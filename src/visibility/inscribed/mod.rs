@@ -71,7 +71,7 @@ pub fn inscribed_boxes(
     let volume_of = |part: &Vec<[Vec3; 3]>| volume_within(part.iter().copied());
     // Pieces that are wound inward hold no box.
     let inward: f64 = parts.iter().map(|part| volume_of(part).min(0.0)).sum();
-    let volume = solid.volume(0) - inward;
+    let volume = volume_within(solid.of(0)) - inward;
     let least = volume * LEAST_GAIN;
     // A box adds no more than its piece has.
     let large = |part: &&Vec<[Vec3; 3]>| volume_of(part) >= least;

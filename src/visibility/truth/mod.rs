@@ -85,25 +85,16 @@ impl SampleTruth {
                 }
             }
         });
-        let (visible, samples_of) = counted(&front, others.into_iter().flatten(), index.items);
+        let mut samples = vec![0u32; index.items];
+        let seen = front.iter().copied().filter(|&item| item != NO_ITEM);
+        seen.chain(others.into_iter().flatten())
+            .for_each(|item| samples[item as usize] += 1);
+        let counts = (0..).zip(samples);
+        let (visible, samples_of) = counts.filter(|(_, count)| *count > 0).unzip();
         SampleTruth {
             front,
             visible,
             samples_of,
         }
     }
-}
-
-/// The items that occur, ascending, and how often.
-fn counted(
-    front: &[ItemId],
-    ties: impl Iterator<Item = ItemId>,
-    items: usize,
-) -> (Vec<ItemId>, Vec<u32>) {
-    let mut samples = vec![0u32; items];
-    let seen = front.iter().copied().filter(|&item| item != NO_ITEM);
-    seen.chain(ties)
-        .for_each(|item| samples[item as usize] += 1);
-    let counts = (0..).zip(samples);
-    counts.filter(|(_, count)| *count > 0).unzip()
 }

@@ -52,8 +52,14 @@ fn each_triangle_has_the_material_of_its_primitive() {
     file["meshes"][0]["primitives"] = json!(all);
     let scene = read(&file).unwrap();
     let single = scene.clone().by_triangle(&LoadOptions::default()).unwrap();
-    let alone = scene.surfaces.as_ref().expect("triangles").some(&[1]);
-    for surfaces in [scene.surfaces, single.surfaces, Some(alone.into())] {
+    let whole = scene.surfaces.as_ref().expect("triangles");
+    let solid = whole
+        .range(1)
+        .skip(8)
+        .take(4)
+        .map(|t| whole.corners(t as u32));
+    assert!(whole.solid_part(1).of(0).eq(solid));
+    for surfaces in [scene.surfaces, single.surfaces] {
         let surfaces = surfaces.expect("triangles");
         let (kinds, two_sided) = (surfaces.kinds.chunks(4), surfaces.two_sided.chunks(4));
         let facts = kinds.zip(two_sided).zip((0..4).cycle());

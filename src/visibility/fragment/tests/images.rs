@@ -29,7 +29,7 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let (ids, solid) = (drawn.ids(), solid.ids());
         assert_eq!(ids, truth.front);
         for (sample, &id) in ids.iter().enumerate() {
-            let probe = canvas.probe(sample);
+            let probe = &canvas.probes[sample];
             let mut along = index.all_along(probe.ray());
             along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
             let opaque =
@@ -88,10 +88,10 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     );
     let mut behind = 0;
     for sample in 0..GRID.samples() {
-        let (masked, open) = (masked.front(sample), open.front(sample));
+        let (masked, open) = (masked.front[sample], open.front[sample]);
         assert_eq!(masked, open.filter(|_| stencil.marked[sample]));
         // Marked is what sees the portal, and no wall or pillar before it.
-        let ray = canvas.probe(sample).ray();
+        let ray = canvas.probes[sample].ray();
         let entry = |b: &WorldBox| judge::entry(ray, b);
         let before = |portal: &judge::Depth| {
             let room = boxes[..first_beyond].iter().filter_map(entry);
@@ -121,7 +121,7 @@ fn screen_rectangles_hold_every_sample_that_meets_the_box() {
             let rectangle = canvas.screen.rectangle(b);
             held += rectangle.as_ref().map_or(0, Rectangle::samples);
             for sample in 0..grid.samples() {
-                let probe = canvas.probe(sample);
+                let probe = &canvas.probes[sample];
                 if probe.enter(b, f64::INFINITY).is_some() {
                     let (column, row) = (sample as u32 % 16, sample as u32 / 16);
                     let holds =
