@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use glam::{DVec2, DVec3, Vec3};
 
+use super::WorldBox;
 use crate::arithmetic::Expansion;
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
@@ -248,15 +249,14 @@ impl Point for DVec3 {}
 /// An empty polygon, whose cell holds no point of the square, gets a point box
 /// outside the square, which region search never enters.
 fn planar_bounds(polygon: &[DVec2]) -> Aabb {
-    let Some(&first) = polygon.first() else {
+    if polygon.is_empty() {
         let beyond = Vec3::splat(f32::from(i16::MAX) * 2.0);
         return Aabb::new(beyond, beyond);
-    };
-    let (low, high) = polygon
-        .iter()
-        .fold((first, first), |(low, high), &p| (low.min(p), high.max(p)));
-    let (low, high) = (low - CELL_MARGIN, high + CELL_MARGIN);
-    Aabb::rounded_outward(low.extend(0.0), high.extend(0.0), DVec3::ZERO)
+    }
+    let corners = polygon.iter().map(|p| WorldBox::at(p.extend(0.0)));
+    let WorldBox { min, max } = WorldBox::union_of(corners);
+    let margin = DVec3::new(CELL_MARGIN, CELL_MARGIN, 0.0);
+    Aabb::rounded_outward(min - margin, max + margin, DVec3::ZERO)
 }
 
 #[cfg(test)]

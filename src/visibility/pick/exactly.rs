@@ -35,20 +35,6 @@ impl<B: Body> First<B> {
         }
     }
 
-    /// Tests a candidate.
-    #[inline(always)]
-    pub fn offer(&mut self, body: &B) {
-        let Some(at) = body.meet(&self.probe, self.limit) else {
-            return;
-        };
-        let met = (body.item(), at);
-        let is_first = |best: Met<B>| order::<B>(&self.probe, &met, &best).is_lt();
-        if self.best.is_none_or(is_first) {
-            self.best = Some(met);
-            self.limit = self.limit.min(B::Probe::at_most(&at));
-        }
-    }
-
     /// The first item, if it is one of the first `items`.
     #[inline]
     pub fn item(&self, items: usize) -> Option<ItemId> {
@@ -61,7 +47,14 @@ impl<B: Body> First<B> {
 impl<B: Body> Visit<B> for First<B> {
     #[inline(always)]
     fn visit(&mut self, body: &B) -> f64 {
-        self.offer(body);
+        if let Some(at) = body.meet(&self.probe, self.limit) {
+            let met = (body.item(), at);
+            let is_first = |best: Met<B>| order::<B>(&self.probe, &met, &best).is_lt();
+            if self.best.is_none_or(is_first) {
+                self.best = Some(met);
+                self.limit = self.limit.min(B::Probe::at_most(&at));
+            }
+        }
         self.limit
     }
 }
@@ -115,7 +108,9 @@ impl<B: Body> Pick for Linear<B> {
     /// O(n).
     fn first(&self, ray: &Ray) -> Option<ItemId> {
         let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
-        self.0.all.iter().for_each(|body| first.offer(body));
+        for body in &self.0.all {
+            first.visit(body);
+        }
         first.item(self.0.items)
     }
 
