@@ -180,7 +180,11 @@ impl WadMap {
             let sector = leaf.map(|leaf| self.leaf_sectors[leaf as usize] as usize);
             let floor = sector.map_or(0.0, |sector| self.sectors[sector].heights[0]);
             let base = thing.at.extend(floor);
-            let (kind, edge, height) = thing.kind_and_size();
+            // linuxdoom 1.10, info.c: players 16 by 56, the pickups of a deathmatch map 20 by 16.
+            let (kind, edge, height) = match thing.kind {
+                1..=4 | 11 => ("start", 32.0, 56.0),
+                _ => ("thing", 40.0, 16.0),
+            };
             boxes.push(WorldBox::standing(base, DVec3::new(edge, edge, height)));
             kinds.push(kind);
             let angle = thing.angle_deg.to_radians();
@@ -199,17 +203,6 @@ impl WadMap {
             places,
             ..scene
         })
-    }
-}
-
-impl Thing {
-    /// Label, width and height (linuxdoom 1.10, info.c: players 16 by 56, the
-    /// pickups of a deathmatch map 20 by 16).
-    fn kind_and_size(&self) -> (&'static str, f64, f64) {
-        match self.kind {
-            1..=4 | 11 => ("start", 32.0, 56.0),
-            _ => ("thing", 40.0, 16.0),
-        }
     }
 }
 

@@ -224,8 +224,8 @@ impl<B: Body> Canvas<B> {
         let grid = self.grid();
         self.screen = Screen::of(rays, grid);
         self.probes.clear();
-        let probes = rays.of_grid(grid).map(|ray| B::probe(&ray, self.origin));
-        self.probes.extend(probes);
+        let all = rays.of_grid(grid);
+        all.for_each(|ray| self.probes.push(B::probe(&ray, self.origin)));
     }
 
     /// Columns and rows.
