@@ -313,7 +313,7 @@ fn cost(ns: f64) -> String {
 fn rule_table(rules: &[Omission], all_columns: bool) -> Table {
     let mut rules = rules.to_vec();
     rules.sort_by_key(|rule| rule.is_needed().map_or(2, |is| u8::from(!is)));
-    // What keeps several stages from the cameras is told once.
+    // A reason that several stages share is given once.
     for row in (1..rules.len()).rev() {
         if rules[row].is_needed().is_none() && rules[row].reason == rules[row - 1].reason {
             "as above".clone_into(&mut rules[row].reason);

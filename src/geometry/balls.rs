@@ -190,8 +190,9 @@ impl Spheres {
     }
 }
 
-/// Bounds that spheres leave in doubt, as far planes or items make many: in vectors, and
-/// apart, or a loop may keep its planes in memory for their sake.
+/// Bounds that spheres leave in doubt, as far planes or items make many.
+///
+/// Tested in vectors, and apart: else a loop may keep its planes in memory for their sake.
 struct Doubtful<'s>(&'s Spheres, PlaneMask, &'s BoxBlock);
 
 impl<I: Isa> Piece<I> for Doubtful<'_> {

@@ -42,9 +42,10 @@ pub struct Protocol {
 pub const CLOCK_NS: f64 = 650.0;
 /// Largest share of a lap that the clock may take.
 pub const MOST_OVERHEAD: f64 = 0.01;
-/// Least time of a lap, ns: what a clock reading costs beyond an empty lap is up to a
-/// hundredth of it. Longer ones are not made of repeated cameras, which a branch
-/// predictor learns.
+/// Least time of a lap, ns.
+///
+/// A clock reading costs up to a hundredth of it more than an empty lap. Longer ones are
+/// not made of repeated cameras, which a branch predictor learns.
 const LEAST_LAP_NS: f64 = 5_000.0;
 /// Most cameras of a cold pass, where each query costs a sweep over memory.
 const COLD_CAMERAS: usize = 24;
@@ -71,7 +72,7 @@ pub struct Schedule {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TaskPlan {
-    /// Queries per clock reading; more than cameras where each is asked several times.
+    /// Queries per clock reading; more than cameras where each is repeated.
     pub batch: u32,
     /// Takes part in every so many-th round: slow tasks in fewer.
     pub every: u32,
@@ -179,8 +180,9 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     (middle - CLOCK_NS).max(middle / 8.0).max(1.0)
 }
 
-/// Queries per clock reading: a power of two that makes the clock negligible, or all
-/// cameras, several times where they take less than [`LEAST_LAP_NS`].
+/// Queries per clock reading: a power of two that makes the clock negligible.
+///
+/// Or all cameras, several times where they take less than [`LEAST_LAP_NS`].
 fn batch(query_ns: f64, cameras: usize) -> usize {
     let queries = |ns: f64| (ns / query_ns.max(1.0)).ceil() as usize;
     let needed = queries(CLOCK_NS / MOST_OVERHEAD).next_power_of_two();

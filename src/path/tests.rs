@@ -126,7 +126,9 @@ fn a_visible_share_holds_where_the_order_of_items_repeats() {
     }
 }
 
-/// Two items far off make the scene large; a near that grows with far loses the dense rest.
+/// Two items far off make the scene large.
+///
+/// A near that grows with far loses the dense rest.
 #[test]
 fn a_share_that_only_a_nearer_far_plane_reaches_is_found() {
     let mut rng = SeededRng::new(5);

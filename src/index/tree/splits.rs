@@ -63,7 +63,7 @@ pub fn locate<C: Context>(
     p: Vec3,
     cx: &mut C,
 ) -> ControlFlow<()> {
-    let nodes = &tree.nodes()[..];
+    let nodes = tree.nodes();
     let mut open = Stack::new(0);
     while let Some(at) = open.pop() {
         let mut at = at as usize;
