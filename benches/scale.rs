@@ -149,7 +149,7 @@ fn main() -> ExitCode {
                 };
                 let mut timed = timed_rounds(workload.views.len(), &[task], &protocol);
                 let timed: Timed = timed.remove(0).expect("as many ids as a scan finds");
-                let ns = timed.ns().unwrap_or(f64::NAN);
+                let ns = timed.ln_ns().map_or(f64::NAN, f64::exp);
                 let count = expected[which].iter().sum::<u64>() / expected[which].len() as u64;
                 cells += &format!(" {count} | {:.2} |", ns / 1e3);
                 if which == 0 && n <= 10_000_000 {

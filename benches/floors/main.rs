@@ -135,8 +135,9 @@ fn harness_overhead(only_test: bool, turns: usize) -> u32 {
             passes[0]
                 .as_ref()
                 .expect("right answers")
-                .ns()
+                .ln_ns()
                 .expect("rounds")
+                .exp()
         };
         let by_hand = || {
             // A list of its own, grown before the clock starts, as in the harness.

@@ -38,7 +38,7 @@ fn winner(place: &Place) -> String {
     let names: Vec<&str> = winners.iter().map(|c| c.structure.as_str()).collect();
     let mut told = names.join(" = ");
     let ratio = winners.first().and_then(|cell| cell.value("speedup"));
-    let ratio = ratio.filter(|_| !place.scan_wins());
+    let ratio = ratio.filter(|_| !winners.iter().any(|cell| cell.is_scan()));
     told += &text::some(ratio, |ratio| format!(": {}", text::significant(ratio)));
     if place.is_off_class() {
         told += &format!(" (at {})", text::short_percent(place.share));
@@ -49,7 +49,8 @@ fn winner(place: &Place) -> String {
 /// From how many items on each structure beats the linear scan.
 fn crossings(surface: &Surface) -> Option<Table> {
     let classes = surface.classes();
-    let cells = surface.no_scans().into_iter().flat_map(|structure| {
+    let trees = surface.names(|cell| !cell.is_scan()).into_iter();
+    let cells = trees.flat_map(|structure| {
         classes.iter().map(move |class| {
             let told = match surface.crossing(structure, *class) {
                 None => String::new(),
@@ -152,7 +153,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     let mut figures = Vec::new();
     for class in surface.classes() {
         let (mut series, mut beyond) = (Vec::new(), 0);
-        for name in surface.structures() {
+        for name in surface.names(|_| true) {
             let (left_out, points) = curve(class, name);
             beyond += left_out;
             if points.len() > 1 {

@@ -60,6 +60,8 @@ fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'
     let lengths: Vec<usize> = visible.iter().map(|&v| v as usize).collect();
     // Each query copies from another place, as answers do: always the first ids
     // would be always the same few cache lines.
+    // Multiples of 2^32 / golden ratio spread them (Knuth, TAOCP vol. 3, sec. 6.4).
+    let scattered = |place: usize| (place as u32).wrapping_mul(0x9E37_79B9) as usize;
     let start = |(place, length)| scattered(place) % (count + 1 - length);
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
     lengths.iter().any(|&length| length > 0).then(|| {
@@ -68,12 +70,6 @@ fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'
             out.extend_from_slice(&ids[start..start + lengths[place]]);
         })
     })
-}
-
-/// Spreads consecutive places: multiples of 2^32 / golden ratio (Knuth, TAOCP
-/// vol. 3, sec. 6.4).
-fn scattered(place: usize) -> usize {
-    (place as u32).wrapping_mul(0x9E37_79B9) as usize
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                     }
                     Pass::Searches => Some(explain_containment(boxes.get(id)?, workload.points[n])),
                 });
-                counted.answers[pass as usize].push(Answer::of(trial.answer()));
+                counted.answers[pass as usize].push(Answer::of(&trial.answer));
             }
         }
     }

@@ -12,10 +12,10 @@ use super::moving::{Frames, Laps, Moving, ageing, replay, times_of};
 use super::process_result::{Measured, Part, SubjectPart};
 use super::schedule::Orders;
 use super::{
-    Answer, Counted, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING,
-    TaskKind, TaskPlan, Timed, Verdict, Workload, guarded,
+    Answer, KeyedSchedule, Notice, Protocol, Sample, Schedule, Status, Subject, TIMING, TaskKind,
+    TaskPlan, Timed, Verdict, Workload, guarded,
 };
-use crate::index::{StructureSpec, UpdatePolicy};
+use crate::index::UpdatePolicy;
 use crate::query::QueryCost;
 
 /// Ageing is measured in every n-th process, because it costs builds.
@@ -86,7 +86,9 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     if plan.process.is_multiple_of(AGES_EVERY) && !plan.plan_only {
         for entry in &mut entries {
             let Subject { spec, is_twin, .. } = entry.subject;
-            if entry.part.verdict.is_ok() && !is_twin && ages(spec) {
+            // Not where it is built again in every frame or in every n-th.
+            let ages = spec.info().refits && spec.policy == UpdatePolicy::Refit;
+            if entry.part.verdict.is_ok() && !is_twin && ages {
                 let found = guarded(|| ageing(spec, frames, &plan.protocol, notice));
                 match found.unwrap_or_else(Err) {
                     Ok(ageing_ln) => entry.part.ageing_ln = ageing_ln,
@@ -103,11 +105,6 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
         ..plan.part(workload, answers, [Some(planned), None])
     };
     (part, samples)
-}
-
-/// False for a structure that is built again in every frame or in every n-th.
-fn ages(spec: &StructureSpec) -> bool {
-    spec.info().refits && spec.policy == UpdatePolicy::Refit
 }
 
 impl Entry<'_> {
@@ -141,12 +138,8 @@ impl Entry<'_> {
                 return Err(Verdict::new(Status::TimedOut, reason));
             }
         }
-        let counted = Counted {
-            answers: [answers, Vec::new()],
-            costs: [cost, QueryCost::default()],
-            ..Counted::default()
-        };
-        self.part.counts = counts(&counted, frames.workload.scene.items.len());
+        let (answers, costs) = ([answers, Vec::new()], [cost, QueryCost::default()]);
+        self.part.counts = counts(&answers, &costs, frames.workload.scene.items.len());
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
         let chose = moving.index.chose();
         let chose = match self.subject.spec.policy {

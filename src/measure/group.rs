@@ -17,6 +17,7 @@ use super::{
     Subject, TIMING, TaskKind, Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
 use crate::kernel::Kernel;
+use crate::query::QueryCost;
 use crate::statistics::{interquartile_mean, median};
 
 /// Reason of what is left out of a scene without items.
@@ -283,7 +284,8 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
         let verdict = of_all.clone().filter(|_| is_ok);
         let verdict = verdict.unwrap_or_else(|| counted.verdict.clone());
         let mut part = SubjectPart::of(subject, verdict);
-        part.counts = counts(&counted, workload.scene.items.len());
+        let items = workload.scene.items.len();
+        part.counts = counts(&counted.answers, &counted.costs, items);
         Entry {
             subject,
             part,
@@ -343,13 +345,14 @@ fn compare_digests(
 }
 
 /// Metrics of the count pass by name, means per query.
-pub(super) fn counts(counted: &Counted, items: usize) -> BTreeMap<String, f64> {
-    let [queries, searches] = [0, 1].map(|pass| counted.answers[pass].len() as f64);
-    let [visible, found] = [0, 1].map(|pass| {
-        let counts = counted.answers[pass].iter().map(|answer| answer.count);
-        counts.sum::<u64>() as f64
-    });
-    let [cost, locate_cost] = &counted.costs;
+pub(super) fn counts(
+    answers: &[Vec<Answer>; 2],
+    [cost, locate_cost]: &[QueryCost; 2],
+    items: usize,
+) -> BTreeMap<String, f64> {
+    let [queries, searches] = answers.each_ref().map(|own| own.len() as f64);
+    let sum = |own: &Vec<Answer>| own.iter().map(|answer| answer.count).sum::<u64>() as f64;
+    let [visible, found] = answers.each_ref().map(sum);
     let accepted = cost.items_accepted_untested;
     let mean = |count: u64| count as f64 / queries;
     let means = [

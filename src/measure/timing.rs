@@ -63,11 +63,6 @@ impl Timed {
         interquartile_mean(&means.iter().map(|ns| ns.ln()).collect::<Vec<_>>())
     }
 
-    /// [`Timed::ln_ns`] as a time, ns.
-    pub fn ns(&self) -> Option<f64> {
-        self.ln_ns().map(f64::exp)
-    }
-
     /// Time of this task / time of `other`, in one process: no interval.
     pub fn over(&self, other: &Timed) -> Option<f64> {
         Some((self.ln_ns()? - other.ln_ns()?).exp())
@@ -384,9 +379,9 @@ mod tests {
         ];
         let timed = Timed { samples };
         assert_eq!(timed.round_means(|s| s.cpu_ns)[0], 100.0);
-        let ns = timed.ns().unwrap();
+        let ns = timed.ln_ns().unwrap().exp();
         assert!((ns - 100.0).abs() < 1e-9, "{ns}");
         assert_eq!(timed.over(&timed), Some(1.0));
-        assert_eq!(Timed::default().ns(), None);
+        assert_eq!(Timed::default().ln_ns(), None);
     }
 }

@@ -229,16 +229,14 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     let (was, is): (Vec<_>, Vec<_>) = relative.map(<(_, _)>::from).unzip();
     let structures = timed.iter().map(|(row, _)| row.cell.structure.as_str());
     let judged = judge_unpaired(&was, &is, &structures.collect::<Vec<_>>(), threshold);
-    let medians = was.iter().zip(&is);
-    let medians = medians.map(|(old, new)| Some([median(old)?, median(new)?]));
-    for (((row, _), medians), judgement) in timed.into_iter().zip(medians).zip(judged) {
-        row.reason = why_inconclusive(medians.is_some(), row.processes);
-        let ratio = medians.map(|[old, new]| (new - old).exp());
-        conclude(row, judgement, ratio);
+    for ((row, _), judgement) in timed.into_iter().zip(judged) {
+        row.reason = why_inconclusive(judgement.is_some(), row.processes);
+        conclude(row, judgement);
     }
 }
 
-/// The old time as it is, and the new one by the ratio of the pairs.
+/// The old time as it is, and the new one by the ratio of the pairs; too few pairs leave
+/// a ratio, which decides nothing.
 fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
     let differences = timed.iter().map(|(_, [old, new])| -> Vec<f64> {
         old.iter().zip(new).map(|(old, new)| new - old).collect()
@@ -251,17 +249,16 @@ fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
         row.new = new.or(row.new);
         row.reason = why_inconclusive(true, row.processes);
         row.pairs_ln_ns = Some(logs);
-        let ratio = row.new.zip(row.old).map(|(new, old)| new / old);
-        conclude(row, judgement, ratio);
+        let pairs = row.processes[0].min(row.processes[1]);
+        let plain = || Some(Judgement::without_interval(row.new? / row.old?, pairs));
+        let judgement = judgement.or_else(plain);
+        conclude(row, judgement);
     }
 }
 
-/// Enters a judgement, or else a ratio, which decides nothing.
-fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>, ratio: Option<f64>) {
-    let pairs = row.processes[0].min(row.processes[1]);
-    let plain = || Some(Judgement::without_interval(ratio?, pairs));
-    row.judgement = judgement.or_else(plain);
-    let change = row.judgement.map(|found| found.change.into());
+fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
+    row.judgement = judgement;
+    let change = judgement.map(|found| found.change.into());
     row.outcome = change.unwrap_or(Outcome::Inconclusive);
 }
 

@@ -108,11 +108,6 @@ impl<'r> Place<'r> {
         !(0.9..=1.1).contains(&(self.share / self.class))
     }
 
-    /// Returns true if a scan is the fastest, or ties with it.
-    pub fn scan_wins(&self) -> bool {
-        self.comparison.winners().any(ReportCell::is_scan)
-    }
-
     /// The sound cell of a structure.
     pub fn cell(&self, structure: &str) -> Option<&'r ReportCell> {
         self.comparison.sound_cell(structure)
@@ -139,17 +134,8 @@ impl Surface<'_> {
         self.sizes().len() > 1 || self.classes().len() > 1
     }
 
-    /// All structures that are sound somewhere, in the order they first appear.
-    pub fn structures(&self) -> Vec<&str> {
-        self.names(|_| true)
-    }
-
-    /// Those of them that may overtake a scan: all but the scans.
-    pub fn no_scans(&self) -> Vec<&str> {
-        self.names(|cell| !cell.is_scan())
-    }
-
-    fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
+    /// Structures with such cells that are sound somewhere, in the order they first appear.
+    pub fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let cells = self.places.iter().flat_map(|p| p.comparison.sound());
         let cells = cells.filter(|cell| is_one(cell));
         unique(cells.map(|cell| cell.structure.as_str()))
@@ -337,7 +323,9 @@ mod tests {
         assert_eq!(surface.world, "uniform:seed=3");
         assert_eq!(surface.sizes(), [1_000, 100_000]);
         assert_eq!(surface.classes(), [0.02, 1.0]);
-        let linear: Vec<bool> = surface.places.iter().map(Place::scan_wins).collect();
+        let linear: Vec<bool> = (surface.places.iter())
+            .map(|place| place.comparison.winners().any(ReportCell::is_scan))
+            .collect();
         assert_eq!(linear, [true, false, false, false]);
         // From a tenth to tenfold: half way by the logarithm.
         let Some(Crossing::At(items)) = surface.crossing("bvh", 0.02) else {

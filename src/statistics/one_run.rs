@@ -50,26 +50,25 @@ impl Estimate {
 
     /// Value and interval divided by a number of units.
     pub fn per(self, units: f64) -> Estimate {
-        Estimate {
-            value: self.value / units,
-            lower: self.lower.map(|end| end / units),
-            upper: self.upper.map(|end| end / units),
-        }
+        self.map(|x| x / units)
     }
 
     /// Value and interval times a number of units, such as a million.
     pub fn times(self, units: f64) -> Estimate {
-        Estimate {
-            value: self.value * units,
-            lower: self.lower.map(|end| end * units),
-            upper: self.upper.map(|end| end * units),
-        }
+        self.map(|x| x * units)
     }
 
     /// The same for a share, which is no more than 1.
-    pub fn of_share(mut self) -> Estimate {
-        self.upper = self.upper.map(|upper| upper.min(1.0));
-        self
+    pub fn of_share(self) -> Estimate {
+        self.map(|share| share.min(1.0))
+    }
+
+    fn map(self, of: impl Fn(f64) -> f64) -> Estimate {
+        Estimate {
+            value: of(self.value),
+            lower: self.lower.map(&of),
+            upper: self.upper.map(of),
+        }
     }
 }
 

@@ -20,13 +20,14 @@ pub enum Fault {
 /// One question at a time; the memory serves all of them. The reference is each box
 /// against each plane with [`AnyVolume::sees`]: no structure, no mask, no early way
 /// out.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct Trial {
     items: usize,
-    /// Items of the right answer, and their number.
     right: IdSet,
-    expected: usize,
-    answer: Vec<ItemId>,
+    /// Number of items of the right answer.
+    pub expected: usize,
+    /// The last answer, right or wrong.
+    pub answer: Vec<ItemId>,
     /// Items of the right answer that are in the structure's.
     found: IdSet,
 }
@@ -37,9 +38,7 @@ impl Trial {
         Trial {
             items,
             right: IdSet::none(items),
-            expected: 0,
-            answer: Vec::new(),
-            found: IdSet::none(items),
+            ..Trial::default()
         }
     }
 
@@ -60,11 +59,6 @@ impl Trial {
         }
     }
 
-    /// Number of items of the right answer.
-    pub fn expected(&self) -> usize {
-        self.expected
-    }
-
     /// Puts the question to a structure, which appends its answer to an empty
     /// list. O(answer + items / 64) if it is right.
     ///
@@ -74,15 +68,10 @@ impl Trial {
         self.answer.clear();
         caught(|| ask(&mut self.answer)).map_err(Fault::Panicked)?;
         let difference = self.compare();
-        match difference.is_none() {
+        match difference == Difference::default() {
             true => Ok(&self.answer),
             false => Err(Fault::Differs(difference)),
         }
-    }
-
-    /// The last answer, right or wrong.
-    pub fn answer(&self) -> &[ItemId] {
-        &self.answer
     }
 
     /// Compares the answer, in any order, with the reference.
@@ -136,7 +125,7 @@ mod tests {
     fn right_wrong_and_panicking_answers_are_told_apart() {
         let mut trial = Trial::new(5);
         trial.expect([1, 3]);
-        assert_eq!(trial.expected(), 2);
+        assert_eq!(trial.expected, 2);
         assert_eq!(trial.ask(|out| out.extend([3, 1])), Ok(&[3, 1][..]));
         let missed = trial.ask(|out| out.push(1)).unwrap_err();
         assert!(

@@ -132,11 +132,6 @@ impl Truth {
         Some(Truth::judged(stored, written, items))
     }
 
-    /// The verdicts of an oracle. O(items).
-    pub fn new(oracle: Oracle, items: &[Aabb]) -> Truth {
-        Truth::judged(oracle, None, items)
-    }
-
     fn judged(oracle: Oracle, written: Option<(Oracle, Originals)>, items: &[Aabb]) -> Truth {
         let mut truth = Truth {
             oracle,
@@ -238,7 +233,7 @@ mod tests {
         let cube = |x: f32| Aabb::around(Vec3::new(x, 0.0, 0.0), Vec3::ONE);
         // In, in, touching, out by one, out by four.
         let items = [cube(0.5), cube(5.0), cube(-1.0), cube(-2.0), cube(-5.0)];
-        let truth = Truth::new(Oracle::of_volume(&half), &items);
+        let truth = Truth::judged(Oracle::of_volume(&half), None, &items);
         let wanted = [
             Verdict::In,
             Verdict::In,

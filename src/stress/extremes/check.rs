@@ -120,7 +120,7 @@ impl Findings {
             self.check([structure, test]);
             let answer = trial.ask(|out| index.query(volume, out)).map(drop);
             let Err(fault) = answer else { continue };
-            let expected = format!("the {} items of the scalar loop", trial.expected());
+            let expected = format!("the {} items of the scalar loop", trial.expected);
             let (expected, first) = match &fault {
                 verify::Fault::Panicked(_) => ("an answer".to_owned(), None),
                 verify::Fault::Differs(difference) => (expected, difference.first),
