@@ -102,7 +102,7 @@ fn missed(camera: Camera) -> [bool; 4] {
     let by_stress = findings
         .faults
         .iter()
-        .any(|fault| fault.row.test == "six-plane");
+        .any(|fault| fault.subject[1] == "six-plane");
     [
         by_run.false_negatives > 0,
         by_verify,

@@ -105,14 +105,24 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let answered = counting.map(drop);
                 let answered = answered.and_then(|()| trial.ask(timed).map(drop));
                 spent[i] += start.elapsed();
-                let question = format!("{} {n}", pass.question());
-                counted.verdict = verdict(answered, spent[i], &question, |id| match pass {
+                let explain = |id: usize| match pass {
                     Pass::Queries => {
                         let item = workload.items.get(id)?;
                         Some(explain_visibility(item, workload.views[n].as_any()))
                     }
                     Pass::Searches => Some(explain_containment(boxes.get(id)?, workload.points[n])),
-                });
+                };
+                let question = format!("{} {n}: ", pass.name());
+                counted.verdict = match answered {
+                    Err(fault @ Fault::Panicked(_)) => Verdict::of(&fault, "", explain),
+                    Err(fault) => Verdict::of(&fault, &question, explain),
+                    Ok(()) if spent[i] > PATIENCE => {
+                        let limit = PATIENCE.as_secs();
+                        let reason = format!("the count pass took longer than {limit} s");
+                        Verdict::new(Status::TimedOut, reason)
+                    }
+                    Ok(()) => Verdict::default(),
+                };
                 counted.answers[pass as usize].push(Answer::of(&trial.answer));
             }
         }
@@ -240,24 +250,6 @@ pub fn blamed(test: CullingTest, mut errors: ErrorCount) -> ErrorCount {
         CullingTest::SixPlane | CullingTest::SixBox => errors.by_planes,
     };
     errors
-}
-
-/// Verdict on a structure from one answer and the time spent so far.
-fn verdict(
-    answered: Result<(), Fault>,
-    spent: Duration,
-    question: &str,
-    explain: impl FnOnce(usize) -> Option<String>,
-) -> Verdict {
-    match answered {
-        Err(fault @ Fault::Panicked(_)) => Verdict::of(&fault, "", |_| None),
-        Err(fault) => Verdict::of(&fault, &format!("{question}: "), explain),
-        Ok(()) if spent > PATIENCE => {
-            let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
-            Verdict::new(Status::TimedOut, reason)
-        }
-        Ok(()) => Verdict::default(),
-    }
 }
 
 /// Adds a note to a structure that declares no scan, but works like one.

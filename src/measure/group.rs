@@ -125,18 +125,18 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     let (mut bounds, mut tasks, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     let mut schedules = [None, None];
     for &pass in &Pass::ALL[..1 + usize::from(plan.locate)] {
-        let (own, cold) = (&answers[pass as usize], plan.protocol.cold);
-        let mut asked = tasks_of(workload, &entries, (pass, cold), own);
-        if pass == Pass::Queries {
-            bounds = add_bounds(&mut asked, workload, subjects, &answers[0], plan.bounds);
-        }
+        let asked = tasks_of(workload, &entries, &plan, pass, &answers[pass as usize]);
+        let is_bound = |label: &str| plan.bounds.iter().any(|bound| bound.name == label);
+        let labels = asked.iter().map(|((label, _), _)| label);
+        bounds.extend(labels.filter(|label| is_bound(label)).cloned());
         let given = plan.known.and_then(|known| known.pass(pass).0);
         let mut protocol = plan.protocol;
-        protocol.task_ns *= pass.share();
+        // Region search gets less, because structures are ranked by frustum queries.
+        protocol.task_ns *= [1.0, 1.0 / 3.0][pass as usize];
         let (planned, asked) = scheduled(asked, given, workload.views.len(), &protocol);
         let (keys, schedule) = (&planned.keys, &planned.schedule);
-        let labels = keys.iter().map(|(label, _)| label);
-        let structure = |label| (!bounds.contains(label)).then(|| original(label));
+        let labels = keys.iter().map(|(label, _)| label.as_str());
+        let structure = |label| (!is_bound(label)).then(|| original(label));
         let structures: Vec<Option<&str>> = labels.map(structure).collect();
         let turn = |task: usize| notice(structures[task], TIMING);
         let timed = match plan.plan_only {
@@ -145,8 +145,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
         };
         let alone = keys.iter().zip(&schedule.tasks);
         // Lower bounds take a part of a query's time, and so have larger batches.
-        let is_alone =
-            |(label, kind): &TaskKey| *kind != TaskKind::Views && !bounds.contains(label);
+        let is_alone = |(label, kind): &TaskKey| *kind != TaskKind::Views && !is_bound(label);
         let alone = alone.filter(|(key, _)| is_alone(key));
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
         for (key, result) in keys.iter().zip(timed) {
@@ -173,11 +172,12 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     (part, samples)
 }
 
-/// The tasks of a pass, for all structures that are right so far.
+/// The tasks of a pass, for all structures that are right so far, and then the lower bounds.
 fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],
-    (pass, cold): (Pass, bool),
+    plan: &GroupPlan,
+    pass: Pass,
     answers: &[Answer],
 ) -> Vec<(TaskKey, TimedTask<'a>)> {
     let mut tasks = Vec::new();
@@ -190,36 +190,23 @@ fn tasks_of<'a>(
             let spec = &entry.subject.spec;
             // Views are shared where builds are, unless each is shared already. One sweep
             // for all of them would compare warm views with cold queries.
-            let are_shared = spec.execution.threads > 1 && spec.query_threads() < 2 && !cold;
-            if kind == TaskKind::Views && !are_shared {
+            let are_shared = spec.execution.threads > 1 && spec.query_threads() < 2;
+            if kind == TaskKind::Views && (!are_shared || plan.protocol.cold) {
                 continue;
             }
             let task = TimedTask::of(kind, spec, workload, built, answers, least_ns);
             tasks.push(((entry.subject.label(), kind), task));
         }
     }
-    tasks
-}
-
-/// Adds the lower bounds that apply to the workload, and returns their names.
-fn add_bounds(
-    tasks: &mut Vec<(TaskKey, TimedTask)>,
-    workload: &Workload,
-    subjects: &[Subject],
-    visible: &[Answer],
-    bounds: &[Bound],
-) -> Vec<String> {
-    let kernel = subjects.first().map(|s| s.spec.execution.kernel);
+    let kernel = entries.first().map(|e| e.subject.spec.execution.kernel);
     let kernel = kernel.unwrap_or_else(Kernel::best);
-    let visible: Vec<u64> = visible.iter().map(|a| a.count).collect();
-    let mut names = Vec::new();
-    for bound in bounds.iter().filter(|_| !visible.is_empty()) {
-        if let Some(task) = (bound.make)(workload, kernel, &visible) {
-            names.push(bound.name.to_owned());
-            tasks.push(((bound.name.to_owned(), TaskKind::Query), task));
-        }
+    let visible: Vec<u64> = answers.iter().map(|a| a.count).collect();
+    let have_bounds = pass == Pass::Queries && !visible.is_empty();
+    for bound in plan.bounds.iter().filter(|_| have_bounds) {
+        let task = (bound.make)(workload, kernel, &visible);
+        tasks.extend(task.map(|task| ((bound.name.to_owned(), TaskKind::Query), task)));
     }
-    names
+    tasks
 }
 
 /// The times of a task, from its samples; a tail of groups of `largest` cameras.
@@ -331,7 +318,7 @@ fn compare_digests(
                 let reason = format!(
                     "{} {n}: {} ids of digest {:016x}; the first process of the run has {} of \
                      {:016x}",
-                    pass.question(),
+                    pass.name(),
                     found.count,
                     found.digest,
                     wanted.count,

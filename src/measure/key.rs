@@ -77,41 +77,23 @@ named! {
     }
 }
 
-/// The two passes of a group, each counted and timed by itself.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Pass {
-    /// Frustum queries, one per camera; lower bounds take part.
-    Queries,
-    /// Region searches, one per eye.
-    Searches,
+named! {
+    /// The two passes of a group, each counted and timed by itself.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    pub(super) enum Pass {
+        /// Frustum queries, one per camera; lower bounds take part.
+        Queries = "camera",
+        /// Region searches, one per eye.
+        Searches = "point",
+    }
 }
 
 impl Pass {
-    pub(super) const ALL: [Pass; 2] = [Pass::Queries, Pass::Searches];
-
     /// The tasks that this pass times in a still scene.
     pub(super) fn tasks(self) -> &'static [TaskKind] {
         match self {
             Pass::Queries => &[TaskKind::Query, TaskKind::Views],
             Pass::Searches => &[TaskKind::Locate, TaskKind::LocateBatched],
-        }
-    }
-
-    /// CPU time of a task of this pass / that of a task of frustum queries.
-    ///
-    /// Region search gets less, because structures are ranked by frustum queries.
-    pub(super) fn share(self) -> f64 {
-        match self {
-            Pass::Queries => 1.0,
-            Pass::Searches => 1.0 / 3.0,
-        }
-    }
-
-    /// Name of the object that one query is for, in messages.
-    pub(super) fn question(self) -> &'static str {
-        match self {
-            Pass::Queries => "camera",
-            Pass::Searches => "point",
         }
     }
 }

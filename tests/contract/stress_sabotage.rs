@@ -211,7 +211,7 @@ fn each_broken_structure_fails_a_vector_and_a_generated_case() {
         );
         let found = findings(family, &structure);
         let mut faults = found.iter().flat_map(|f| &f.faults);
-        let caught = faults.any(|f| f.row.structure == broken.info.name && f.item.is_some());
+        let caught = faults.any(|f| f.subject[0] == broken.info.name && f.item.is_some());
         assert!(caught, "{} passes {family}", broken.info.name);
     }
 }
@@ -234,8 +234,8 @@ fn a_panic_is_a_failure_of_that_structure_alone() {
                 .collect();
             assert!(!faults.is_empty(), "{} passes {family}", broken.info.name);
             for fault in faults {
-                assert_eq!(fault.row.structure, broken.info.name, "{family}: {fault:?}");
-                assert!(told(&fault.row.got.to_string()), "{family}: {fault:?}");
+                assert_eq!(fault.subject[0], broken.info.name, "{family}: {fault:?}");
+                assert!(told(&fault.got), "{family}: {fault:?}");
             }
         }
     }
@@ -265,7 +265,7 @@ fn planes_without_a_margin_fail_vectors_and_every_family() {
                 let mut case = case.expect("a camera");
                 case.planes.epsilon = 0.0;
                 let faults = case.check(&[], 0).faults;
-                faults.iter().any(|fault| fault.row.test == "six-plane")
+                faults.iter().any(|fault| fault.subject[1] == "six-plane")
             })
         });
         assert!(caught, "{}", family.name);

@@ -135,7 +135,9 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
         counted: None,
     };
     let entries: Vec<Entry> = subjects.iter().map(entry).collect();
-    let tasks = tasks_of(&workload, &entries, (Pass::Queries, false), &known.visible);
+    let info = SceneInfo::of(&scene);
+    let plan = GroupPlan::new(&workload, &info, protocol());
+    let tasks = tasks_of(&workload, &entries, &plan, Pass::Queries, &known.visible);
     let (planned, _) = scheduled(tasks, known.query.as_ref(), 8, &protocol());
     let batches: Vec<u32> = planned.schedule.tasks.iter().map(|t| t.batch).collect();
     assert_eq!(batches, [3], "its own, not the one in its place");

@@ -12,9 +12,10 @@ use crate::oracle::Pose;
 use crate::scene::SeededRng;
 
 /// Shapes of the boxes of a case.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub enum Shapes {
     /// Points, cubes, slivers, specks and boxes larger than the volume.
+    #[default]
     Mixed,
     /// Lines and plates: zero on one or two axes, long on the others.
     Needles,
@@ -309,6 +310,7 @@ fn plain(value: f64) -> String {
 }
 
 /// A camera that is still being described, as exact numbers.
+#[derive(Default)]
 pub struct Draft {
     eye: DVec3,
     forward: DVec3,
@@ -351,11 +353,7 @@ impl Draft {
             aspect: rng.between(0.4, 2.5),
             near: far / libm::exp2(rng.between(2.0, 8.0)),
             far: Some(far),
-            origin: DVec3::ZERO,
-            planes: PlaneOptions::default(),
-            shapes: Shapes::Mixed,
-            to_look: false,
-            other_lens: None,
+            ..Draft::default()
         }
     }
 

@@ -11,8 +11,8 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
 use crate::oracle::Verdict;
 use crate::query::{AnyVolume, ItemId};
+use crate::stress::Said;
 use crate::stress::sheet::slack;
-use crate::stress::{Level, Row, Said, Status};
 use crate::verify::{self, ErrorCount, Trial, Truth, scan};
 
 /// Name of the scalar loop in place of a structure.
@@ -46,10 +46,14 @@ impl std::ops::AddAssign for Tally {
 /// A wrong answer, or none.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fault {
-    /// Its row, but for the id and the level of the case.
-    pub row: Row,
+    /// Structure and test.
+    pub subject: [String; 2],
     /// Index of the box; `None` where the whole answer is wrong.
     pub item: Option<usize>,
+    /// What is right.
+    pub expected: Said,
+    /// What was found instead.
+    pub got: String,
     /// The box and the truth about it, so that a reader can check by hand.
     pub about: Option<String>,
 }
@@ -79,23 +83,16 @@ impl Findings {
     /// Notes a wrong answer.
     pub fn fault(
         &mut self,
-        [structure, test]: [&str; 2],
+        subject: [&str; 2],
         item: Option<usize>,
         expected: impl Into<Said>,
         got: String,
     ) {
         self.faults.push(Fault {
-            row: Row {
-                id: String::new(),
-                level: Level::Camera,
-                structure: structure.to_owned(),
-                test: test.to_owned(),
-                status: Status::Fail,
-                expected: expected.into(),
-                got: got.into(),
-                kernel: None,
-            },
+            subject: subject.map(str::to_owned),
             item,
+            expected: expected.into(),
+            got,
             about: None,
         });
     }

@@ -129,6 +129,16 @@ impl Extremes<'_> {
     fn gather(&self, section: &mut Section, level: Level, outcomes: Vec<Outcome>) {
         let mut checked: BTreeMap<[String; 3], u64> = BTreeMap::new();
         let mut failed = BTreeSet::new();
+        let row = |id, [structure, test]: [String; 2], status, expected, got: String| Row {
+            id,
+            level,
+            structure,
+            test,
+            status,
+            expected,
+            got: got.into(),
+            kernel: None,
+        };
         for (seed, group, findings) in outcomes {
             section.cases += 1;
             section.boxes += findings.boxes;
@@ -136,17 +146,16 @@ impl Extremes<'_> {
             for [structure, test] in findings.checked {
                 *checked.entry([group.clone(), structure, test]).or_default() += 1;
             }
-            for Fault { row, item, about } in findings.faults {
-                failed.insert([group.clone(), row.structure.clone(), row.test.clone()]);
+            for fault in findings.faults {
+                let [structure, test] = fault.subject.clone();
+                failed.insert([group.clone(), structure, test]);
+                let (subject, expected) = (&fault.subject, &fault.expected);
+                let fail = |id, got| row(id, subject.clone(), Status::Fail, expected.clone(), got);
                 let id = format!("{group}/seed {seed}");
-                let of_box = item.map(|item| format!("{id}/box {item}")).zip(about);
-                let of_box = of_box.map(|(id, about)| Row {
-                    id,
-                    level,
-                    got: about.into(),
-                    ..row.clone()
-                });
-                section.rows.push(Row { id, level, ..row });
+                let of_box = fault.item.map(|item| format!("{id}/box {item}"));
+                let of_box = of_box.zip(fault.about);
+                section.rows.push(fail(id, fault.got));
+                let of_box = of_box.map(|(id, about)| fail(id, about));
                 section.rows.extend(of_box);
             }
         }
@@ -157,16 +166,10 @@ impl Extremes<'_> {
                 (SCALAR, Level::Planes) => "drops nothing beyond the rounding error",
                 _ => "returns exactly the set of the scalar loop",
             };
-            section.rows.push(Row {
-                id: format!("{group}/from seed {}", self.seed),
-                level,
-                structure,
-                test,
-                status: Status::Pass,
-                expected: expected.into(),
-                got: format!("so in all of {cases} cases").into(),
-                kernel: None,
-            });
+            let id = format!("{group}/from seed {}", self.seed);
+            let (expected, got) = (expected.into(), format!("so in all of {cases} cases"));
+            let passed = row(id, [structure, test], Status::Pass, expected, got);
+            section.rows.push(passed);
         }
     }
 }
