@@ -12,7 +12,7 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
+    Machine, Protocol, Schedule, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed,
 };
 use cullbench::query::AnyVolume;
 use cullbench::statistics::{median, slope};
@@ -147,7 +147,9 @@ fn main() -> ExitCode {
                     cameras: if only_test { 8 } else { cameras_within(1e9, n) },
                     ..protocol
                 };
-                let mut timed = timed_rounds(workload.views.len(), &[task], &protocol);
+                let tasks = [task];
+                let schedule = Schedule::new(workload.views.len(), &tasks, &protocol);
+                let mut timed = timed(&tasks, &schedule, &protocol, &|_| ());
                 let timed: Timed = timed.remove(0).expect("as many ids as a scan finds");
                 let ns = timed.ln_ns().map_or(f64::NAN, f64::exp);
                 let count = expected[which].iter().sum::<u64>() / expected[which].len() as u64;

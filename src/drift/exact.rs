@@ -28,10 +28,6 @@ impl Matrix {
         Matrix(std::array::from_fn(column))
     }
 
-    pub fn identity() -> Self {
-        DMat3::IDENTITY.into()
-    }
-
     fn transposed(&self) -> Self {
         Matrix::from_entries(|i, j| self.0[i][j].clone())
     }
@@ -49,7 +45,7 @@ impl Matrix {
     /// The matrix `exponent` times over, by repeated squaring.
     pub fn power(&self, exponent: u64) -> Self {
         match exponent {
-            0 => Matrix::identity(),
+            0 => Matrix::from(DMat3::IDENTITY),
             _ if exponent & 1 == 1 => self.power(exponent - 1).times(self),
             _ => self.times(self).power(exponent / 2),
         }
@@ -59,7 +55,7 @@ impl Matrix {
     pub fn about(axis: usize, degrees: &Expansion) -> Self {
         let (sin, cos) = sin_cos_degrees(degrees);
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut turn = Matrix::identity();
+        let mut turn = Matrix::from(DMat3::IDENTITY);
         turn.0[last][next] = -&sin;
         turn.0[next][last] = sin;
         (turn.0[next][next], turn.0[last][last]) = (cos.clone(), cos);
@@ -68,7 +64,7 @@ impl Matrix {
 
     /// The matrix less the identity, rounded.
     fn beyond_identity(&self) -> DMat3 {
-        let one = Matrix::identity();
+        let one = Matrix::from(DMat3::IDENTITY);
         let entry = |i: usize, j: usize| (&self.0[j][i] - &one.0[j][i]).estimate();
         DMat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| entry(i, j))))
     }
@@ -236,7 +232,7 @@ mod tests {
             let off = apart(&step().power(steps), &by_quaternions(steps));
             assert!(off < 1e-50, "{steps}: {off:e}");
         }
-        assert_eq!(apart(&step().power(0), &Matrix::identity()), 0.0);
+        assert_eq!(apart(&step().power(0), &Matrix::from(DMat3::IDENTITY)), 0.0);
     }
 
     #[test]
@@ -254,7 +250,7 @@ mod tests {
         let whole = step().power(10_000_000);
         assert!(apart(&whole, &split) < 1e-45);
         let gram = whole.transposed_times(&whole);
-        assert!(apart(&gram, &Matrix::identity()) < 1e-45);
+        assert!(apart(&gram, &Matrix::from(DMat3::IDENTITY)) < 1e-45);
     }
 
     #[test]
@@ -287,9 +283,9 @@ mod tests {
             }
         }
         let shear = DMat3::from_cols(DVec3::X, DVec3::new(1e-5, 1.0, 0.0), DVec3::Z);
-        let [_, found] = errors(shear, &Matrix::identity());
+        let [_, found] = errors(shear, &Matrix::from(DMat3::IDENTITY));
         assert!((found / libm::atan(0.5e-5) - 1.0).abs() < 1e-9, "{found}");
-        let found = errors(stretched, &Matrix::identity());
+        let found = errors(stretched, &Matrix::from(DMat3::IDENTITY));
         for (found, wanted) in found.into_iter().zip([0.44, 0.0]) {
             assert!((found - wanted).abs() < 1e-12, "{found}");
         }

@@ -153,7 +153,7 @@ mod tests {
             assert!((3e-15..8e-15).contains(worst), "{all:?}");
         }
         let moments = (toolkit.walk)(99_966..=100_000).into_iter();
-        let mut moments = moments.map(|axes| errors(axes, &Matrix::identity())[0]);
+        let mut moments = moments.map(|axes| errors(axes, &Matrix::from(glam::DMat3::IDENTITY))[0]);
         assert!(moments.any(|error| error < 1e-15));
     }
 

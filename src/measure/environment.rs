@@ -157,9 +157,7 @@ fn caches(folder: &Path) -> Vec<Cache> {
         Some(text.trim().to_owned())
     };
     let cache = |index: usize| -> Option<Cache> {
-        if read(index, "type")? == "Instruction" {
-            return None;
-        }
+        read(index, "type").filter(|kind| kind != "Instruction")?;
         let size = read(index, "size")?;
         let bytes = match size.strip_suffix('K') {
             Some(kilo) => kilo.parse::<u64>().ok()? << 10,

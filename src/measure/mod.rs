@@ -79,7 +79,7 @@ pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, camera
 pub use shared_work::SharedWork;
 pub use study::{Setting, StudyPlan};
 pub use task::{Ask, AskMany, TimedTask};
-pub use timing::{Sample, Timed, timed, timed_rounds};
+pub use timing::{Sample, Timed, timed};
 pub(crate) use workload::input_for;
 pub use workload::{Workload, WorkloadError, input_of};
 

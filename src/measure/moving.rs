@@ -8,8 +8,8 @@ use super::clock::{Lap, Stopwatch};
 use super::count::{Judging, MOST_JUDGED, spread};
 use super::process_result::Known;
 use super::{
-    Answer, Judged, Notice, Protocol, Status, TaskKind, TimedTask, Verdict, Workload,
-    compare_with_scan, guarded, timed_rounds,
+    Answer, Judged, Notice, Protocol, Schedule, Status, TaskKind, TimedTask, Verdict, Workload,
+    compare_with_scan, guarded, timed,
 };
 use crate::culling::CameraView;
 use crate::geometry::Aabb;
@@ -325,7 +325,8 @@ fn over_fresh(
     let mut few = *protocol;
     few.rounds = [ROUNDS, ROUNDS];
     few.cameras = protocol.cameras.min(CAMERAS);
-    let timed = timed_rounds(workload.views.len(), &tasks, &few);
+    let schedule = Schedule::new(workload.views.len(), &tasks, &few);
+    let timed = timed(&tasks, &schedule, &few, &|_| ());
     Ok(match &timed[..] {
         [Ok(refitted), Ok(rebuilt)] => refitted.over(rebuilt).map(f64::ln),
         _ => None,

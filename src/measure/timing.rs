@@ -69,18 +69,6 @@ impl Timed {
     }
 }
 
-/// Makes a schedule for `count` cameras and times the tasks by it, in one process.
-///
-/// [`Schedule::new`], then [`timed`].
-pub fn timed_rounds(
-    count: usize,
-    tasks: &[TimedTask],
-    protocol: &Protocol,
-) -> Vec<Result<Timed, Verdict>> {
-    let schedule = Schedule::new(count, tasks, protocol);
-    timed(tasks, &schedule, protocol, &|_| ())
-}
-
 /// Times the tasks by a schedule; returns the samples or the failure of each task.
 ///
 /// `turn` gets the number of a task before each of its turns. A sample with another number
@@ -152,10 +140,9 @@ struct TaskTimer<'p, 'a> {
 impl TaskTimer<'_, '_> {
     /// Runs `work` for a task that has not failed yet; a panic fails the task.
     fn guarded(&mut self, task: usize, work: impl FnOnce(&mut Self)) {
-        if self.results[task].is_err() {
-            return;
-        }
-        if let Err(verdict) = guarded(|| work(self)) {
+        if self.results[task].is_ok()
+            && let Err(verdict) = guarded(|| work(self))
+        {
             self.results[task] = Err(verdict);
         }
     }
@@ -274,6 +261,11 @@ mod tests {
         }
     }
 
+    fn timed_rounds(tasks: &[TimedTask], protocol: &Protocol) -> Vec<Result<Timed, Verdict>> {
+        let schedule = Schedule::new(40, tasks, protocol);
+        timed(tasks, &schedule, protocol, &|_| ())
+    }
+
     #[test]
     fn every_round_covers_every_timed_camera_once() {
         for cold in [false, true] {
@@ -282,7 +274,7 @@ mod tests {
                 task(|_| 0, vec![0; 40]),
             ];
             let protocol = Protocol { cold, ..protocol() };
-            for timed in timed_rounds(40, &all, &protocol) {
+            for timed in timed_rounds(&all, &protocol) {
                 let timed = timed.unwrap();
                 assert_eq!(timed.round_means(|s| s.cpu_ns).len(), 3);
                 for round in 0..3 {
@@ -301,7 +293,7 @@ mod tests {
             ask_many: Some(Box::new(|cameras| cameras.len() as u64)),
             ..task(|_| 1, vec![1; 40])
         };
-        let timed = timed_rounds(40, &[many], &protocol());
+        let timed = timed_rounds(&[many], &protocol());
         let timed = timed.into_iter().next().unwrap().unwrap();
         assert_eq!((timed.samples.len(), timed.samples[0].queries), (3, 40));
     }
@@ -333,7 +325,7 @@ mod tests {
         let right = task(|c| c as u64, expected.clone());
         expected[20] += 1;
         let all = [right, task(|c| c as u64, expected)];
-        let found = timed_rounds(40, &all, &protocol());
+        let found = timed_rounds(&all, &protocol());
         assert!(found[0].is_ok());
         assert_eq!(found[1].as_ref().unwrap_err().status, Status::Wrong);
     }
@@ -347,7 +339,7 @@ mod tests {
         // In the pass itself, and before it, when its cost is found.
         for at in [39, 0] {
             let all = [panics(40), panics(at)];
-            let found = timed_rounds(40, &all, &protocol());
+            let found = timed_rounds(&all, &protocol());
             assert_eq!(
                 found[0].as_ref().unwrap().round_means(|s| s.cpu_ns).len(),
                 3

@@ -1,6 +1,6 @@
 //! An experiment in the process of its caller: from names to a report.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use super::Report;
@@ -91,8 +91,7 @@ impl Experiment {
             let mut keep = |part: Part, _| {
                 stream.parts.push(KeptPart {
                     part,
-                    rows: BTreeMap::new(),
-                    samples_end: 0,
+                    ..KeptPart::default()
                 });
             };
             measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| ())?;

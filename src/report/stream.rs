@@ -151,7 +151,7 @@ impl Header {
 }
 
 /// A part with what samples.csv holds up to its end.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct KeptPart {
     /// Results of the process.
     pub part: Part,
@@ -162,7 +162,7 @@ pub struct KeptPart {
 }
 
 /// Everything that a stream holds.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, Default, PartialEq, Debug)]
 pub struct Stream {
     /// The first line.
     pub header: Header,
@@ -177,8 +177,7 @@ impl Stream {
     pub fn of(header: Header) -> Stream {
         Stream {
             header,
-            parts: Vec::new(),
-            finished_at: None,
+            ..Stream::default()
         }
     }
 

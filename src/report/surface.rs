@@ -183,9 +183,8 @@ impl Surface<'_> {
         let here = |place: &&Place| place.class == class && place.items == items;
         let mut places = self.places.iter().filter(here);
         places.all(|place| {
-            let ratio = place
-                .cell(structure)
-                .and_then(|cell| cell.metrics.get("speedup"));
+            let cell = place.cell(structure);
+            let ratio = cell.and_then(|cell| cell.metrics.get("speedup"));
             ratio.is_none_or(|ratio| ratio.estimate().exceeds(1.0))
         })
     }

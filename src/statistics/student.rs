@@ -6,19 +6,16 @@ use super::{Estimate, student};
 
 /// P(T > t).
 pub(super) fn upper_tail(t: f64, df: f64) -> f64 {
-    match StudentsT::new(0.0, 1.0, df) {
-        // By symmetry: 1 - cdf would lose what is small.
-        Ok(student) if !t.is_nan() => student.cdf(-t),
-        _ => f64::NAN,
-    }
+    let student = StudentsT::new(0.0, 1.0, df).ok().filter(|_| !t.is_nan());
+    // By symmetry: 1 - cdf would lose what is small.
+    student.map_or(f64::NAN, |student| student.cdf(-t))
 }
 
 /// The t that the share `p` of the distribution lies below.
 pub(super) fn quantile(p: f64, df: f64) -> f64 {
-    match StudentsT::new(0.0, 1.0, df) {
-        Ok(student) if (0.0..=1.0).contains(&p) => student.inverse_cdf(p),
-        _ => f64::NAN,
-    }
+    let student = StudentsT::new(0.0, 1.0, df).ok();
+    let student = student.filter(|_| (0.0..=1.0).contains(&p));
+    student.map_or(f64::NAN, |student| student.inverse_cdf(p))
 }
 
 /// Slope of the least-squares line through the points `(x, y)` with its 95 %
