@@ -137,11 +137,7 @@ pub struct Verdict {
 
 impl Verdict {
     /// The verdict on a fault, told behind its place.
-    pub fn of(
-        fault: &Fault,
-        place: &str,
-        explain: impl FnOnce(usize) -> Option<String>,
-    ) -> Verdict {
+    pub fn of(fault: &Fault, place: &str, explain: impl FnOnce(usize) -> Option<String>) -> Self {
         let told = fault.explained(explain);
         Verdict::new(Status::of(fault), format!("{place}{told}"))
     }

@@ -140,20 +140,13 @@ impl<'p> MergedParts<'p> {
     }
 
     /// Results of a structure in each process.
-    fn subjects<'l>(
-        &self,
-        label: &'l str,
-    ) -> impl Iterator<Item = &'p SubjectPart> + Clone + use<'p, 'l> {
+    fn subjects(&self, label: &str) -> impl Iterator<Item = &'p SubjectPart> + Clone {
         let all = self.parts.iter().flat_map(|part| &part.subjects);
         all.filter(move |s| s.label == label)
     }
 
     /// A task of a structure in each process.
-    fn tasks<'l>(
-        &self,
-        label: &'l str,
-        task: TaskKind,
-    ) -> impl Iterator<Item = &'p TaskPart> + use<'p, 'l> {
+    fn tasks(&self, label: &str, task: TaskKind) -> impl Iterator<Item = &'p TaskPart> {
         let all = self.parts.iter().flat_map(|part| &part.tasks);
         all.filter(move |t| t.label == label && t.task == task)
     }
@@ -259,11 +252,7 @@ impl<'p> MergedParts<'p> {
     }
 
     /// Mean over processes of a positive value of a structure.
-    fn over_processes(
-        &self,
-        label: &str,
-        of: impl Fn(&SubjectPart) -> Option<f64>,
-    ) -> Option<Estimate> {
+    fn over_processes(&self, label: &str, of: fn(&SubjectPart) -> Option<f64>) -> Option<Estimate> {
         let values = self.subjects(label).filter_map(of).filter(|v| *v > 0.0);
         let logs: Vec<f64> = values.map(f64::ln).collect();
         one_run(&logs, &logs)
