@@ -172,7 +172,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     (part, samples)
 }
 
-/// The tasks of a pass, for all structures that are right so far, and then the lower bounds.
+/// The tasks of a pass: those of all structures that are right, then lower bounds.
 fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],

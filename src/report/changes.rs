@@ -235,8 +235,9 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     }
 }
 
-/// The old time as it is, and the new one by the ratio of the pairs; too few pairs leave
-/// a ratio, which decides nothing.
+/// The old time as it is, and the new one by the ratio of the pairs.
+///
+/// Too few pairs leave a ratio, which decides nothing.
 fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
     let differences = timed.iter().map(|(_, [old, new])| -> Vec<f64> {
         old.iter().zip(new).map(|(old, new)| new - old).collect()

@@ -134,7 +134,7 @@ impl Surface<'_> {
         self.sizes().len() > 1 || self.classes().len() > 1
     }
 
-    /// Structures with such cells that are sound somewhere, in the order they first appear.
+    /// Structures with such sound cells, in the order they first appear.
     pub fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let cells = self.places.iter().flat_map(|p| p.comparison.sound());
         let cells = cells.filter(|cell| is_one(cell));

@@ -50,9 +50,9 @@ pub struct Fault {
     pub subject: [String; 2],
     /// Index of the box; `None` where the whole answer is wrong.
     pub item: Option<usize>,
-    /// What is right.
+    /// The right answer.
     pub expected: Said,
-    /// What was found instead.
+    /// The answer that was found.
     pub got: String,
     /// The box and the truth about it, so that a reader can check by hand.
     pub about: Option<String>,
