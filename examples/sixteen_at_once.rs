@@ -70,7 +70,7 @@ impl RegionIndex for Tiles16 {
             let (met, cut_by) = q.sorted_lanes(isa, block, mask);
             let met = met & lanes;
             recorder.subtrees_rejected((lanes & !met).count_ones());
-            let inside = isa.zeros(cut_by);
+            let inside = isa.equal(cut_by, 0);
             for lane in lanes_of(met) {
                 let from = (first + lane) * TILE;
                 let to = self.ids.len().min(from + TILE);

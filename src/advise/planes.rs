@@ -136,7 +136,7 @@ impl QueryVolume for Unmasked<'_> {
     #[inline(always)]
     fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         let (kept, words) = self.0.sorted_lanes(isa, block, mask);
-        let inside = isa.zeros(words);
+        let inside = isa.equal(words, 0);
         let mut open = [mask; LANES];
         let lanes = open.iter_mut().enumerate();
         let inside = lanes.filter(|(lane, _)| inside >> lane & 1 == 1);

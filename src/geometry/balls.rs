@@ -99,14 +99,6 @@ pub(super) fn distances<I: Isa>(
     isa.near_mul_add(c, z, sum)
 }
 
-/// The lanes whose distance is not below the least.
-///
-/// No closure: one that is called twice is compiled apart, without the instruction set.
-#[inline(always)]
-fn above<I: Isa>(isa: I, distances: I::Floats, least: f32) -> LaneMask {
-    isa.kept(isa.keep(isa.keep_all(), distances, isa.splat(least)))
-}
-
 /// The lanes that are kept, by the distances of their farthest points.
 #[inline(always)]
 pub(super) fn decide<'s, I: Isa>(
@@ -115,8 +107,8 @@ pub(super) fn decide<'s, I: Isa>(
     doubt: f32,
     question: impl FnOnce() -> (&'s Spheres, PlaneMask, &'s BoxBlock),
 ) -> LaneMask {
-    let possible = above(isa, farthest, -doubt);
-    let sure = above(isa, farthest, doubt);
+    let possible = isa.not_below(farthest, -doubt);
+    let sure = isa.not_below(farthest, doubt);
     if possible == sure {
         return sure;
     }

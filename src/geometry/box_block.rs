@@ -43,20 +43,14 @@ impl BoxBlock {
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Aabb {
         let row = |k: usize| self.rows[k][lane];
-        Aabb::new(
-            Vec3::new(row(0), row(1), row(2)),
-            Vec3::new(row(3), row(4), row(5)),
-        )
+        Aabb::new(each([0, 1, 2], row).into(), each([3, 4, 5], row).into())
     }
 
     /// The union of the boxes; empty ones ([`Aabb::EMPTY`]) add nothing.
     pub fn union(&self) -> Aabb {
         let low = |k: usize| halved(&self.rows[k], Vec4::min).min_element();
         let high = |k: usize| halved(&self.rows[k], Vec4::max).max_element();
-        Aabb::new(
-            Vec3::new(low(0), low(1), low(2)),
-            Vec3::new(high(3), high(4), high(5)),
-        )
+        Aabb::new(each([0, 1, 2], low).into(), each([3, 4, 5], high).into())
     }
 
     /// The lane whose box is nearest to a point by the sum over axes; of several, the
@@ -158,7 +152,7 @@ impl BoxBlock {
         let [x, y, z] = centre;
         // Cubes cut off at the end of f32 have no sphere.
         let whole = !isa.at_most(isa.splat(f32::MAX), reach);
-        let mut dropped = 0;
+        let mut kept = LaneMask::MAX;
         for (plane, corner, margin) in planes {
             let n = plane.normal;
             let sum = isa.add(scaled(isa, n.x, x), scaled(isa, n.y, y));
@@ -168,9 +162,10 @@ impl BoxBlock {
             let value = isa.add(sum, scaled(isa, margin.slope, reach));
             let is_number = isa.at_most(isa.splat(f32::MIN), value);
             let far = values_at(isa, plane, self.corner_rows(corner));
-            dropped |= isa.below_zero(far) | (isa.below_zero(value) & is_number & whole);
+            let beyond = !isa.not_below(value, 0.0) & is_number & whole;
+            kept &= isa.not_below(far, 0.0) & !beyond;
         }
-        !dropped
+        kept
     }
 
     /// The boxes as seen from `eye`: [`Aabb::relative_to`] lane by lane.

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::{Aabb, ConvexVolume, Plane, VolumeError};
+use super::{Aabb, ConvexVolume, Plane, PlaneF64, VolumeError};
 
 /// Planes in coordinates relative to an f32 eye.
 ///
@@ -38,10 +38,8 @@ impl RelativeVolume {
     /// # Errors
     /// An eye or an offset beyond f32.
     pub fn about(eye: Vec3, volume: &ConvexVolume) -> Result<Self, VolumeError> {
-        let moved = volume.planes().iter().map(|plane| {
-            let at_eye = plane.normal.as_dvec3().dot(eye.as_dvec3()) + f64::from(plane.d);
-            Plane::new(plane.normal, at_eye as f32)
-        });
+        let moved = volume.planes().iter().map(PlaneF64::from);
+        let moved = moved.map(|plane| plane.about(eye.as_dvec3()).narrow());
         let planes: Vec<Plane> = moved.collect();
         RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
     }

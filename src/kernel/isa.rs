@@ -69,14 +69,17 @@ pub trait Isa: Copy + Send + Sync {
     fn max(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a - |b|`, rounded once.
     fn sub_abs(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
-    /// The lanes where `a < 0`.
-    fn below_zero(self, a: Self::Floats) -> LaneMask;
     /// All lanes.
     fn keep_all(self) -> Self::Kept;
     /// Those of the lanes where not `values < least`: a NaN stays.
     fn keep(self, kept: Self::Kept, values: Self::Floats, least: Self::Floats) -> Self::Kept;
     /// One bit per lane that is kept.
     fn kept(self, kept: Self::Kept) -> LaneMask;
+    /// The lanes where not `values < least`: a NaN stays.
+    #[inline(always)]
+    fn not_below(self, values: Self::Floats, least: f32) -> LaneMask {
+        self.kept(self.keep(self.keep_all(), values, self.splat(least)))
+    }
     /// The lanes where `a <= b`.
     fn at_most(self, a: Self::Floats, b: Self::Floats) -> LaneMask;
 
@@ -94,8 +97,6 @@ pub trait Isa: Copy + Send + Sync {
         least: Self::Floats,
         bits: u32,
     ) -> Self::Words;
-    /// The lanes that are zero.
-    fn zeros(self, words: Self::Words) -> LaneMask;
     /// The lanes that are `x`.
     fn equal(self, words: Self::Words, x: u32) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
@@ -179,9 +180,9 @@ mod tests {
             isa.append(&mut out, self.words, self.lanes);
             isa.append(&mut out, self.words, !self.lanes);
             let masks = [
-                isa.below_zero(a),
+                isa.not_below(a, 0.0),
                 isa.at_most(a, b),
-                isa.zeros(words),
+                isa.equal(words, 0),
                 isa.equal(words, 5),
                 isa.kept(isa.keep(isa.keep(isa.keep_all(), a, b), b, isa.splat(0.0))),
             ];

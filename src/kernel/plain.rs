@@ -79,10 +79,6 @@ impl Isa for Plain {
         lanes(|lane| a[lane] - b[lane].abs())
     }
     #[inline(always)]
-    fn below_zero(self, a: Floats) -> LaneMask {
-        lanes_where(|lane| a[lane] < 0.0)
-    }
-    #[inline(always)]
     fn keep_all(self) -> Words {
         [0; LANES]
     }
@@ -116,10 +112,6 @@ impl Isa for Plain {
             let inside = values[lane] >= least[lane];
             words[lane] & !if inside { bits } else { 0 }
         })
-    }
-    #[inline(always)]
-    fn zeros(self, words: Words) -> LaneMask {
-        lanes_where(|lane| words[lane] == 0)
     }
     #[inline(always)]
     fn equal(self, words: Words, x: u32) -> LaneMask {

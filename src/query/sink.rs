@@ -178,7 +178,7 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
             let mut found = 0;
             let rows = &held.as_chunks().0[..tested.div_ceil(LANES)];
             for (i, row) in rows.iter().enumerate() {
-                let some = !isa.zeros(isa.words(row));
+                let some = !isa.equal(isa.words(row), 0);
                 if let Some(place) = hits[found..].first_chunk_mut() {
                     isa.compress(place, isa.iota((i * LANES) as u32), some);
                 }

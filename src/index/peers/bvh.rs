@@ -47,8 +47,8 @@ impl BHShape<f32, 3> for Shape {
 #[inline(always)]
 fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     Aabb::new(
-        Vec3::new(b.min.x, b.min.y, b.min.z),
-        Vec3::new(b.max.x, b.max.y, b.max.z),
+        <[f32; 3]>::from(b.min).into(),
+        <[f32; 3]>::from(b.max).into(),
     )
 }
 

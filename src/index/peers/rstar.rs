@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
 use crate::geometry::Aabb;
@@ -22,10 +21,7 @@ impl RTreeObject for Record {
 
 #[inline(always)]
 fn bounds_of(envelope: &AABB<[f32; 3]>) -> Aabb {
-    Aabb::new(
-        Vec3::from_array(envelope.lower()),
-        Vec3::from_array(envelope.upper()),
-    )
+    Aabb::new(envelope.lower().into(), envelope.upper().into())
 }
 
 /// Slots of a node and of its descendants.

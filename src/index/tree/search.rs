@@ -119,7 +119,7 @@ impl PackedTree {
                 let kept = kept & links.lanes;
                 cx.recorder()
                     .subtrees_rejected((links.lanes & !kept).count_ones());
-                let inside = isa.zeros(open) & kept;
+                let inside = isa.equal(open, 0) & kept;
                 let undecided = kept & !inside;
                 let words = isa.words(&links.below);
                 below.push(isa, words, open, undecided & !links.leaves);

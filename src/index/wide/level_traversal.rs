@@ -4,7 +4,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::levels::Layer;
-use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
+use super::single_plane_buckets::SinglePlaneBuckets;
 use crate::geometry::{BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
 use crate::index::items::PaddedIds;
@@ -74,7 +74,7 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
         if whole.entries().is_empty() {
             return ControlFlow::Continue(());
         }
-        self.test_listed(leaves, whole.entries(), WhollyInside)
+        self.test_listed(leaves, whole.entries(), SamePlanes(WhollyInside, None))
     }
 
     /// Passes the items of a frontier's leaves that no open plane drops to the sink.
@@ -91,17 +91,14 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
         let mut rest = here;
         if here.len() >= WORTH_BUCKETS {
             buckets.distribute(isa, here);
-            for plane in 0..BUCKETS {
-                let listed = buckets.bucket(plane);
+            for (plane, bucket) in buckets.buckets.iter().enumerate() {
+                let listed = bucket.entries();
                 if listed.is_empty() {
                     continue;
                 }
                 let plane = plane as u32;
-                let test = SinglePlane {
-                    volume: self.volume,
-                    plane: self.volume.one_plane(isa, plane),
-                    mask: 1 << plane,
-                };
+                let open = Some(V::planes_open(1 << plane));
+                let test = SamePlanes(self.volume.one_plane(isa, plane), open);
                 self.test_listed(leaves, listed, test)?;
             }
             rest = &buckets.rest;
@@ -152,7 +149,7 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
         let (kept, open) = self.volume.sorted_lanes(isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
         recorder.subtrees_rejected((lanes & !kept).count_ones());
-        let inside = isa.zeros(open) & kept;
+        let inside = isa.equal(open, 0) & kept;
         let undecided = kept & !inside;
         let first = at * LANES;
         below.push(isa, isa.iota(first as u32), open, undecided);
@@ -182,19 +179,16 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
 /// Fewest leaves that are distributed over buckets.
 const WORTH_BUCKETS: usize = 48;
 
-/// The test of one leaf after another: its index in the list, and its block.
+/// The planes of one leaf of a list after another.
 trait LeafTest<I: Isa> {
-    /// True if the test reads spheres where there are any.
-    const SPHERES: bool = false;
+    /// Planes of a leaf.
+    type Planes: Planes<I>;
 
-    /// Prefetches the rows of the i-th leaf that its test reads.
-    fn prefetch(&self, block: &BoxBlock, i: usize);
+    /// The planes that the i-th leaf is tested with.
+    fn planes(&self, i: usize) -> Self::Planes;
 
-    /// The lanes of a leaf that are answers, if they hold an item.
-    fn kept(&self, isa: I, leaves: &Layer, leaf: (usize, usize)) -> LaneMask;
-
-    /// Records the test of the i-th leaf, which holds `items` items.
-    fn record<R: Recorder>(&self, recorder: &mut R, i: usize, items: u32);
+    /// How many planes those count as; none if the leaf is wholly inside.
+    fn open(&self, i: usize) -> Option<u32>;
 }
 
 /// Leaves of a list, tested when the sink requests them.
@@ -218,8 +212,8 @@ impl<T, R> ListedLeaves<'_, '_, T, R> {
             && let Some(block) = self.leaves.blocks.get(leaf as usize)
         {
             match self.leaves.balls {
-                Some(balls) if T::SPHERES => balls.blocks[leaf as usize].prefetch(),
-                _ => self.test.prefetch(block, i),
+                Some(balls) if T::Planes::SPHERES => balls.blocks[leaf as usize].prefetch(),
+                _ => self.test.planes(i).prefetch(block),
             }
             if let Some(row) = self.ids.get(leaf as usize) {
                 prefetch(row);
@@ -242,67 +236,52 @@ impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R
             self.prefetch(i + AHEAD);
         }
         let at = self.listed[i] as usize;
-        let kept = self.test.kept(isa, self.leaves, (i, at));
-        let items = self.occupied[at];
-        self.test.record(self.recorder, i, items.count_ones());
-        (at, kept & items)
+        let (planes, block) = (self.test.planes(i), &self.leaves.blocks[at]);
+        let kept = match &self.leaves.balls {
+            Some(balls) if T::Planes::SPHERES => planes.kept_balls(isa, balls, (at, block)),
+            _ => planes.kept(isa, block),
+        };
+        let items = self.occupied[at].count_ones();
+        match self.test.open(i) {
+            Some(planes) => {
+                self.recorder.items_tested(items);
+                self.recorder.planes_tested(items * planes);
+            }
+            None => self.recorder.subtree_accepted(items as usize),
+        }
+        (at, kept & self.occupied[at])
     }
 }
 
-/// Records the test of a leaf against the planes of a mask.
-#[inline(always)]
-fn record<V: QueryVolume, R: Recorder>(recorder: &mut R, _: &V, mask: PlaneMask, items: u32) {
-    recorder.items_tested(items);
-    recorder.planes_tested(items * V::planes_open(mask));
+/// The same planes for all leaves, and how many they count as.
+struct SamePlanes<P>(P, Option<u32>);
+
+impl<I: Isa, P: Planes<I>> LeafTest<I> for SamePlanes<P> {
+    type Planes = P;
+
+    #[inline(always)]
+    fn planes(&self, _: usize) -> P {
+        self.0
+    }
+
+    #[inline(always)]
+    fn open(&self, _: usize) -> Option<u32> {
+        self.1
+    }
 }
 
-/// Nothing to test: the leaves are wholly inside.
+/// Nothing to test: leaves are wholly inside.
+#[derive(Clone, Copy)]
 struct WhollyInside;
 
-impl<I: Isa> LeafTest<I> for WhollyInside {
+impl<I: Isa> Planes<I> for WhollyInside {
     #[inline(always)]
-    fn prefetch(&self, _: &BoxBlock, _: usize) {}
-
-    #[inline(always)]
-    fn kept(&self, _: I, _: &Layer, _: (usize, usize)) -> LaneMask {
+    fn kept(&self, _: I, _: &BoxBlock) -> LaneMask {
         LaneMask::MAX
     }
 
     #[inline(always)]
-    fn record<R: Recorder>(&self, recorder: &mut R, _: usize, items: u32) {
-        recorder.subtree_accepted(items as usize);
-    }
-}
-
-/// The same single plane for all leaves.
-struct SinglePlane<'a, V, P> {
-    volume: &'a V,
-    plane: P,
-    mask: PlaneMask,
-}
-
-impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P> {
-    const SPHERES: bool = V::SPHERES;
-
-    #[inline(always)]
-    fn prefetch(&self, block: &BoxBlock, _: usize) {
-        self.plane.prefetch(block);
-    }
-
-    #[inline(always)]
-    fn kept(&self, isa: I, leaves: &Layer, (_, at): (usize, usize)) -> LaneMask {
-        match &leaves.balls {
-            Some(balls) if V::SPHERES => {
-                (self.plane).kept_balls(isa, balls, (at, &leaves.blocks[at]))
-            }
-            _ => self.plane.kept(isa, &leaves.blocks[at]),
-        }
-    }
-
-    #[inline(always)]
-    fn record<R: Recorder>(&self, recorder: &mut R, _: usize, items: u32) {
-        record(recorder, self.volume, self.mask, items);
-    }
+    fn prefetch(&self, _: &BoxBlock) {}
 }
 
 /// Open planes of each leaf.
@@ -311,26 +290,16 @@ struct OpenPlanes<'a, V> {
     masks: &'a [PlaneMask],
 }
 
-impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
-    const SPHERES: bool = V::SPHERES;
+impl<'a, I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'a, V> {
+    type Planes = (&'a V, PlaneMask);
 
     #[inline(always)]
-    fn prefetch(&self, block: &BoxBlock, i: usize) {
-        self.volume.prefetch(block, self.masks[i]);
+    fn planes(&self, i: usize) -> (&'a V, PlaneMask) {
+        (self.volume, self.masks[i])
     }
 
     #[inline(always)]
-    fn kept(&self, isa: I, leaves: &Layer, (i, at): (usize, usize)) -> LaneMask {
-        let mask = self.masks[i];
-        let block = (at, &leaves.blocks[at]);
-        match &leaves.balls {
-            Some(balls) if V::SPHERES => self.volume.kept_balls(isa, balls, block, mask),
-            _ => self.volume.kept_lanes(isa, block.1, mask),
-        }
-    }
-
-    #[inline(always)]
-    fn record<R: Recorder>(&self, recorder: &mut R, i: usize, items: u32) {
-        record(recorder, self.volume, self.masks[i], items);
+    fn open(&self, i: usize) -> Option<u32> {
+        Some(V::planes_open(self.masks[i]))
     }
 }

@@ -3,25 +3,12 @@
 use std::arch::x86_64::*;
 
 use super::packer::{PackTo, Packer};
+use crate::kernel::Work;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
-/// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
-#[derive(Clone, Copy, Debug)]
-pub struct Avx2(());
-
-impl Avx2 {
-    /// Only for code that was compiled for these instructions.
-    #[inline]
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    pub(super) fn here() -> Self {
-        Avx2(())
-    }
-}
-
-#[inline(never)]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn apart<P: Piece<Avx2>>(isa: Avx2, piece: P) -> P::Output {
-    piece.run(isa)
+instruction_set! {
+    /// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
+    Avx2, "avx2,bmi1,bmi2,lzcnt,popcnt"
 }
 
 type Floats = [__m256; 2];
@@ -108,12 +95,6 @@ impl Isa for Avx2 {
         each!(|i| unsafe { _mm256_sub_ps(a[i], _mm256_andnot_ps(_mm256_set1_ps(-0.0), b[i])) })
     }
     #[inline(always)]
-    fn below_zero(self, a: Floats) -> LaneMask {
-        signs_256(each!(|i| unsafe {
-            _mm256_cmp_ps::<_CMP_LT_OQ>(a[i], _mm256_setzero_ps())
-        }))
-    }
-    #[inline(always)]
     fn keep_all(self) -> Floats {
         self.splat(0.0)
     }
@@ -157,12 +138,6 @@ impl Isa for Avx2 {
                 _mm256_and_si256(_mm256_castps_si256(inside), _mm256_set1_epi32(bits as i32));
             _mm256_andnot_si256(bits, words[i])
         })
-    }
-    #[inline(always)]
-    fn zeros(self, words: Words) -> LaneMask {
-        signs_256(each!(|i| unsafe {
-            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_setzero_si256()))
-        }))
     }
     #[inline(always)]
     fn equal(self, words: Words, x: u32) -> LaneMask {

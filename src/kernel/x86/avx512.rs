@@ -4,26 +4,13 @@ use std::arch::x86_64::*;
 
 use super::avx2::halves_of_pairs;
 use super::packer::{PackTo, Packer};
+use crate::kernel::Work;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
-/// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
-/// that AVX2 stands for here.
-#[derive(Clone, Copy, Debug)]
-pub struct Avx512(());
-
-impl Avx512 {
-    /// Only for code that was compiled for these instructions.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
-    pub(super) fn here() -> Self {
-        Avx512(())
-    }
-}
-
-#[inline(never)]
-#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn apart<P: Piece<Avx512>>(isa: Avx512, piece: P) -> P::Output {
-    piece.run(isa)
+instruction_set! {
+    /// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
+    /// that AVX2 stands for here.
+    Avx512, "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt"
 }
 
 // SAFETY, of all blocks below: the receiver proves that the processor has the
@@ -90,10 +77,6 @@ impl Isa for Avx512 {
         unsafe { _mm512_sub_ps(a, _mm512_abs_ps(b)) }
     }
     #[inline(always)]
-    fn below_zero(self, a: __m512) -> LaneMask {
-        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, _mm512_setzero_ps()) }
-    }
-    #[inline(always)]
     fn keep_all(self) -> LaneMask {
         LaneMask::MAX
     }
@@ -131,10 +114,6 @@ impl Isa for Avx512 {
             let bits = _mm512_set1_epi32(bits as i32);
             _mm512_mask_andnot_epi32(words, inside, bits, words)
         }
-    }
-    #[inline(always)]
-    fn zeros(self, words: __m512i) -> LaneMask {
-        unsafe { _mm512_testn_epi32_mask(words, words) }
     }
     #[inline(always)]
     fn equal(self, words: __m512i, x: u32) -> LaneMask {

@@ -5,6 +5,29 @@
 //! instructions do.
 #![allow(unsafe_code)]
 
+/// The proof of an instruction set, and work that is compiled for it.
+macro_rules! instruction_set {
+    ($(#[$about:meta])* $Set:ident, $features:literal) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $Set(());
+
+        impl $Set {
+            /// Does the work with these instructions.
+            #[target_feature(enable = $features)]
+            pub(super) fn run<W: Work>(work: W) -> W::Output {
+                work.run($Set(()))
+            }
+        }
+
+        #[inline(never)]
+        #[target_feature(enable = $features)]
+        fn apart<P: Piece<$Set>>(isa: $Set, piece: P) -> P::Output {
+            piece.run(isa)
+        }
+    };
+}
+
 mod avx2;
 mod avx512;
 mod packer;
@@ -18,7 +41,7 @@ pub fn detect(kernel: Kernel) -> bool {
     macro_rules! all {
         ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
     }
-    // The features of `avx2` and `avx512` below, each by name.
+    // The features of `Avx2` and `Avx512`, each by name.
     let avx2 = || all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt");
     match kernel {
         Kernel::Portable => true,
@@ -34,26 +57,16 @@ pub fn detect(kernel: Kernel) -> bool {
 pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {
     match kernel {
         Kernel::Avx512 if kernel.is_available() => {
-            // SAFETY: `detect` has found every feature that `avx512` is
+            // SAFETY: `detect` has found every feature that `Avx512` is
             // compiled for on this processor.
-            unsafe { avx512(work) }
+            unsafe { avx512::Avx512::run(work) }
         }
         Kernel::Avx2 if kernel.is_available() => {
-            // SAFETY: as above, for the features of `avx2`.
-            unsafe { avx2(work) }
+            // SAFETY: as above, for the features of `Avx2`.
+            unsafe { avx2::Avx2::run(work) }
         }
         _ => work.run(Plain),
     }
-}
-
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn avx2<W: Work>(work: W) -> W::Output {
-    work.run(avx2::Avx2::here())
-}
-
-#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn avx512<W: Work>(work: W) -> W::Output {
-    work.run(avx512::Avx512::here())
 }
 
 /// Prefetches the cache line at the start of `place`, without effect on values.

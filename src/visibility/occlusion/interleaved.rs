@@ -249,7 +249,7 @@ fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32
         let down = (rects.y1[lane] - rects.y0[lane] - rim).max(0) as u32;
         *enough = u32::from(across * down >= pixels);
     }
-    !isa.zeros(isa.words(&enough))
+    !isa.equal(isa.words(&enough), 0)
 }
 
 /// Bits of a float grow with it from zero on; what is before the eye comes first.

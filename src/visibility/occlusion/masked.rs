@@ -119,9 +119,9 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         for lane in 0..LANES {
             large[lane] = (across[lane] | down[lane]) & !1;
         }
-        let small = lanes & isa.zeros(isa.words(&large));
-        let wide = !isa.zeros(isa.words(&across));
-        let high = !isa.zeros(isa.words(&down));
+        let small = lanes & isa.equal(isa.words(&large), 0);
+        let wide = !isa.equal(isa.words(&across), 0);
+        let high = !isa.equal(isa.words(&down), 0);
         let mut hidden = small;
         // The lower row of tiles is tested if it differs from the upper one.
         for (y, other) in [(&rects.y0, LaneMask::MAX), (&rects.y1, high)] {
@@ -191,7 +191,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
                 shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
             }
-            hidden &= !behind | isa.zeros(isa.words(&shown));
+            hidden &= !behind | isa.equal(isa.words(&shown), 0);
         }
         hidden
     }

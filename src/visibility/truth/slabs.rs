@@ -142,7 +142,7 @@ impl Slabs {
         let less_first = isa.min(less_entry, isa.splat(-self.near));
         Tested {
             // A sum has the sign of the true one.
-            lanes: !isa.below_zero(isa.add(less_first, exit)),
+            lanes: isa.not_below(isa.add(less_first, exit), 0.0),
             less_entry,
         }
     }
