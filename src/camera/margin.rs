@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{CameraError, Frame, Lens, Result};
+use super::{Camera, CameraError, PlaneMethod, Result, require};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::{ConvexVolume, FrustumPlane, Plane, PlaneF64};
 
@@ -56,15 +56,25 @@ impl Margin {
     /// Coordinates are about the sum of the points `zero`, those of the frame too.
     ///
     /// `of_scene` is the scene's reach in them, zero if it is not known.
+    ///
+    /// # Errors
+    /// An epsilon or a reach without a guarantee.
     pub(super) fn new(
-        frame: &Frame,
-        lens: &Lens,
+        camera: &Camera,
         zero: &[DVec3],
         of_scene: DVec3,
         c: f64,
-        of_frame: bool,
-    ) -> Margin {
-        let at_depth = |depth| lens.corners_at(frame, depth);
+        by: PlaneMethod,
+    ) -> Result<Margin> {
+        let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
+        let found = format_args!("epsilon is {c} and reach {of_scene}");
+        let rule = "numbers of at least 0, and a finite epsilon";
+        require(are_sound, found, rule)?;
+        if let largest @ f64::INFINITY = of_scene.element_sum() {
+            return Err(CameraError::Sums { largest });
+        }
+        let (frame, lens) = (camera.frame_about(zero), &camera.lens);
+        let at_depth = |depth| lens.corners_at(&frame, depth);
         let (near, far) = match lens.matrix() {
             None => (at_depth(lens.near()), lens.far().map(at_depth)),
             Some(matrix) => {
@@ -85,7 +95,7 @@ impl Margin {
         // normals that are subnormal in f32 are no less rounded than others.
         let underflow = reach.element_sum() * TINY;
         let of_named = lens.matrix().map_or(derived, |_| underflow);
-        Margin {
+        Ok(Margin {
             c,
             reach,
             near,
@@ -93,8 +103,8 @@ impl Margin {
             depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
             derived: [of_named, derived],
-            of_frame,
-        }
+            of_frame: by == PlaneMethod::Frame && lens.matrix().is_none(),
+        })
     }
 
     /// Named planes and further ones as one volume.
@@ -201,14 +211,15 @@ fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Camera, PlaneOptions, Surroundings, look_at};
+    use crate::camera::{Lens, PlaneOptions, Surroundings, look_at};
     use glam::Vec3;
 
     #[test]
     fn a_plane_that_is_not_finite_stays_what_it_is() {
         let frame = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
         let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
-        let margin = Margin::new(&frame, &lens, &[], DVec3::ONE, 1.0, false);
+        let camera = Camera { frame, lens };
+        let margin = Margin::new(&camera, &[], DVec3::ONE, 1.0, PlaneMethod::FrameF32).unwrap();
         for d in [f32::INFINITY, f32::NEG_INFINITY] {
             let plane = Plane::new(Vec3::Y, d);
             assert_eq!(margin.moved(None, &plane, 0.0).d, d);

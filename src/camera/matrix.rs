@@ -152,11 +152,6 @@ impl ViewProjection {
         matches!(self.convention, ColumnD3d | RowD3d)
     }
 
-    /// Returns whether the clip space may have y downward.
-    pub(super) fn is_vulkan(&self) -> bool {
-        self.convention == MatrixConvention::ColumnD3d
-    }
-
     /// The planes in f64 about the sum of some points, of unit length: sums and
     /// offsets are exact before they are rounded, so every number of a plane is
     /// true to 3 units of 2^-53 of itself, but for a factor that all share.

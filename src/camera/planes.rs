@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::Margin;
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result, require};
+use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume,
 };
@@ -114,7 +114,7 @@ impl Camera {
         let of_scene = around.reach.as_dvec3();
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
-        let margin = self.margin(&zero, of_scene, options.epsilon, options.method)?;
+        let margin = Margin::new(self, &zero, of_scene, options.epsilon, options.method)?;
         margin.volume(&named, more, of_scene, 0.0)
     }
 
@@ -168,7 +168,7 @@ impl Camera {
             Vec3::ZERO if self.lens.far().is_some() => DVec3::ZERO,
             _ => reach + zero.abs(),
         };
-        let margin = self.margin(&about, of_scene, epsilon, PlaneMethod::Frame)?;
+        let margin = Margin::new(self, &about, of_scene, epsilon, PlaneMethod::Frame)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let planes = margin.volume(&named, &more, reach + zero.abs(), of_eye)?;
         Ok(RelativeVolume::new(eye, planes)?)
@@ -177,7 +177,7 @@ impl Camera {
 
 impl Camera {
     /// The frame about the sum of some points, one after the other.
-    fn frame_about(&self, zero: &[DVec3]) -> Frame {
+    pub(super) fn frame_about(&self, zero: &[DVec3]) -> Frame {
         let moved = |frame: Frame, zero: &DVec3| frame.relative_to(*zero);
         zero.iter().fold(self.frame, moved)
     }
@@ -187,20 +187,6 @@ impl Camera {
             LensKind::Matrix(matrix) => matrix.planes_about(zero),
             _ => double::from_frame(&self.frame_about(zero), &self.lens),
         }
-    }
-
-    fn margin(&self, zero: &[DVec3], of_scene: DVec3, c: f64, by: PlaneMethod) -> Result<Margin> {
-        let frame = self.frame_about(zero);
-        let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
-        let found = format_args!("epsilon is {c} and reach {of_scene}");
-        let rule = "numbers of at least 0, and a finite epsilon";
-        require(are_sound, found, rule)?;
-        if let largest @ f64::INFINITY = of_scene.element_sum() {
-            return Err(CameraError::Sums { largest });
-        }
-        let (lens, is_matrix) = (&self.lens, self.lens.matrix().is_some());
-        let of_frame = by == PlaneMethod::Frame && !is_matrix;
-        Ok(Margin::new(&frame, lens, zero, of_scene, c, of_frame))
     }
 
     fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes> {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::matrix::{about, unprojected};
-use super::{Camera, CameraError, Lens, Pose, Result, ViewProjection, require};
+use super::{Camera, CameraError, Lens, MatrixConvention, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
 /// A view whose depth is a smaller share of its distance from the eye counts as
@@ -61,7 +61,7 @@ impl ViewProjection {
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
         let image = [across, upward].map(DVec3::normalize);
         // Only Vulkan's clip space has y downward.
-        let up = match is_mirrored && self.is_vulkan() {
+        let up = match is_mirrored && self.convention() == MatrixConvention::ColumnD3d {
             true => -upward,
             false => upward,
         };

@@ -30,7 +30,7 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     /// their bounds with it.
     const CANCELLED: f64 = 2e-9;
     let mut tightest: [Option<f64>; 6] = [None; 6];
-    for [a, b, c] in triples(faces) {
+    for [a, b, c] in combinations(faces.len()).map(|triple| triple.map(|face| &faces[face])) {
         let crossed = [
             cross(b.normal, c.normal),
             cross(c.normal, a.normal),
@@ -124,8 +124,4 @@ pub fn extended(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
 pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
     let lengths = PlaneF64::corners(faces).into_iter().map(DVec3::length);
     lengths.fold(0.0, f64::max)
-}
-
-fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {
-    combinations(faces.len()).map(|triple| triple.map(|face| &faces[face]))
 }

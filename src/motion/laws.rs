@@ -109,7 +109,7 @@ impl World {
     }
 
     /// The box at a random place, another one for each number `n`.
-    fn anywhere(&self, id: ItemId, n: u32) -> Aabb {
+    pub(super) fn anywhere(&self, id: ItemId, n: u32) -> Aabb {
         let b = &self.start[id as usize];
         let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
         let room = (self.high - self.low) - (max - min);
@@ -197,10 +197,6 @@ pub(super) fn spawn(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
         true => world.anywhere(id, moves),
         false => REMOVED,
     })
-}
-
-pub(super) fn shuffle(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
-    Some(world.anywhere(id, moves))
 }
 
 pub(super) fn bepu(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {

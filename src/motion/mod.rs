@@ -47,7 +47,8 @@ pub static MOTIONS: &[MotionFamily] = rows! { MotionFamily { name, summary, shar
     "growth", "bounds swell to twice the size and shrink again", 0.01, 0.05, laws::growth;
     "spawn", "half of the movers disappear, half appear at a new place (step is not read)",
         0.01, 1.0, laws::spawn;
-    "shuffle", "each mover to a random place (step is not read)", 0.01, 1.0, laws::shuffle;
+    "shuffle", "each mover to a random place (step is not read)", 0.01, 1.0,
+        |world, id, moves| Some(world.anywhere(id, moves));
     "bepu", "10 X^10 world units per frame, X uniform in 0..1, reflected (bepuphysics); step is a factor",
         1.0, 1.0, laws::bepu;
 };

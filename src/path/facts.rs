@@ -125,10 +125,8 @@ fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
 
 /// Lens of a camera; that of a matrix without one stays the matrix.
 fn plain_lens(camera: &Camera) -> Lens {
-    let found = camera.lens.matrix().map(ViewProjection::unprojected);
-    found.map_or(camera.lens, |found| {
-        found.map_or(camera.lens, |found| found.camera.lens)
-    })
+    let found = camera.lens.matrix().and_then(|m| m.unprojected().ok());
+    found.map_or(camera.lens, |found| found.camera.lens)
 }
 
 fn fovy_deg(lens: &Lens) -> Option<f64> {

@@ -7,8 +7,6 @@ use std::ops::ControlFlow;
 use ::bvh::aabb::{Aabb as CrateAabb, Bounded, IntersectsAabb};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh, BvhNode};
-use glam::Vec3;
-use nalgebra::Point3;
 
 use super::{place_of, placed};
 use crate::geometry::Aabb;
@@ -27,11 +25,8 @@ struct Shape {
 impl Bounded<f32, 3> for Shape {
     #[inline(always)]
     fn aabb(&self) -> CrateAabb<f32, 3> {
-        let point = |v: Vec3| Point3::new(v.x, v.y, v.z);
-        CrateAabb {
-            min: point(self.item.bounds.min),
-            max: point(self.item.bounds.max),
-        }
+        let Aabb { min, max } = self.item.bounds;
+        CrateAabb::with_bounds(min.to_array().into(), max.to_array().into())
     }
 }
 
@@ -200,6 +195,7 @@ impl BoxTested for PeerBvh {
 mod tests {
     use super::*;
     use crate::index::{FrustumQuery, Input, RegionIndex};
+    use glam::Vec3;
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.

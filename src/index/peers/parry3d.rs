@@ -90,6 +90,15 @@ fn bounds_of(node: &BvhNode) -> Aabb {
     Aabb::new(vector(node.mins()), vector(node.maxs()))
 }
 
+/// The action for the crate, which is to end with the sink.
+#[inline(always)]
+fn unless_ended(flow: ControlFlow<()>, action: TraversalAction) -> TraversalAction {
+    match flow {
+        ControlFlow::Continue(()) => action,
+        ControlFlow::Break(()) => TraversalAction::EarlyExit,
+    }
+}
+
 impl BoxTested for PeerParry3d {
     const ABOUT: Info = Info::new(
         "peer-parry3d",
@@ -172,10 +181,7 @@ impl BoxTested for PeerParry3d {
         self.bvh.traverse_indexed(None, |node, at| {
             if let Some(id) = node.leaf_data() {
                 flow = ask.item(&bounds_of(node), &id);
-                return match flow {
-                    ControlFlow::Continue(()) => TraversalAction::Continue,
-                    ControlFlow::Break(()) => TraversalAction::EarlyExit,
-                };
+                return unless_ended(flow, TraversalAction::Continue);
             }
             let (rejected, accepted) = ask.rejects_accepts(&bounds_of(node));
             if rejected {
@@ -190,17 +196,11 @@ impl BoxTested for PeerParry3d {
                 if let Some(id) = node.leaf_data() {
                     accepted += 1;
                     flow = ask.cx.accept(&[id]);
-                    if flow.is_break() {
-                        return TraversalAction::EarlyExit;
-                    }
                 }
-                TraversalAction::Continue
+                unless_ended(flow, TraversalAction::Continue)
             });
             ask.cx.recorder().subtree_accepted(accepted);
-            match flow {
-                ControlFlow::Continue(()) => TraversalAction::Prune,
-                ControlFlow::Break(()) => TraversalAction::EarlyExit,
-            }
+            unless_ended(flow, TraversalAction::Prune)
         });
         flow
     }

@@ -26,31 +26,10 @@ pub struct PackedTree {
     /// The nodes again, sixteen to a block, for queries by volumes.
     pub(super) wide_nodes: WideNodes,
     positions: Positions,
-    paths: Paths,
-}
-
-/// The ways from items to the root, computed at the first refit.
-#[derive(Default)]
-struct Paths {
-    /// The leaf of each position.
+    /// The leaf of each position, from the first refit on.
     leaves: Vec<u32>,
-    /// The parent of each node; the root's is the root.
+    /// The parent of each node, from the first refit on; the root's is the root.
     parents: Vec<u32>,
-}
-
-impl Paths {
-    fn of(nodes: &[TreeNode], items: usize) -> Paths {
-        let (mut leaves, mut parents) = (vec![0; items], vec![0; nodes.len()]);
-        for node in 0..nodes.len() {
-            for child in children(nodes, node) {
-                parents[child] = node as u32;
-            }
-            if is_leaf(nodes, node) {
-                leaves[nodes[node].items()].fill(node as u32);
-            }
-        }
-        Paths { leaves, parents }
-    }
 }
 
 impl PackedTree {
@@ -168,8 +147,8 @@ impl PackedTree {
         MemoryUsage {
             node_bytes: size_of_val(&self.nodes[..])
                 + self.wide_nodes.bytes()
-                + size_of_val(&self.paths.leaves[..])
-                + size_of_val(&self.paths.parents[..]),
+                + size_of_val(&self.leaves[..])
+                + size_of_val(&self.parents[..]),
             item_bytes: self.boxes.bytes() + size_of_val(&self.ids[..]) + self.positions.bytes(),
         }
     }
@@ -190,22 +169,22 @@ impl PackedTree {
         if !moved.iter().all(stays) {
             return false;
         }
-        if self.paths.parents.is_empty() {
-            self.paths = Paths::of(&self.nodes, self.ids.len());
+        if self.parents.is_empty() {
+            self.find_paths();
         }
         let mut changed = Dirty::none(self.nodes.len());
         for (i, &id) in moved.iter().enumerate() {
             if let Some(position) = self.positions.ahead(items, moved, i) {
                 self.boxes.prefetch(position);
-                prefetch(&self.paths.leaves[position]);
+                prefetch(&self.leaves[position]);
             }
             let Some(position) = self.positions.of(id) else {
                 continue;
             };
             self.boxes.set(position, &items[id as usize]);
-            let mut node = self.paths.leaves[position] as usize;
+            let mut node = self.leaves[position] as usize;
             while changed.mark(node) {
-                node = self.paths.parents[node] as usize;
+                node = self.parents[node] as usize;
             }
         }
         for word in (0..changed.words()).rev() {
@@ -216,6 +195,20 @@ impl PackedTree {
             }
         }
         true
+    }
+
+    /// Finds the ways from items to the root.
+    fn find_paths(&mut self) {
+        self.leaves.resize(self.ids.len(), 0);
+        self.parents.resize(self.nodes.len(), 0);
+        for node in 0..self.nodes.len() {
+            for child in children(&self.nodes, node) {
+                self.parents[child] = node as u32;
+            }
+            if self.is_leaf(node) {
+                self.leaves[self.nodes[node].items()].fill(node as u32);
+            }
+        }
     }
 
     /// Computes a node's bounds from its children, or a leaf's from its items.

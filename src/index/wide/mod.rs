@@ -374,7 +374,7 @@ impl RegionIndex for Wide {
     }
 
     fn memory(&self) -> MemoryUsage {
-        let leaves = self.levels.first().map_or(0, |l| l.blocks);
+        let leaves = self.occupied.len();
         MemoryUsage {
             node_bytes: (self.blocks.len() - leaves) * size_of::<BoxBlock>(),
             item_bytes: leaves * size_of::<BoxBlock>()

@@ -130,7 +130,7 @@ impl Moving {
         self.positions.prepare(&self.still.ids, items);
         self.moved.resize(items.max(self.moved.len()), REST);
         if self.regions.is_empty() {
-            let leaves = self.still.levels.first().map_or(0, |level| level.blocks);
+            let leaves = self.still.occupied.len();
             self.homes = self.still.blocks[leaves..].to_vec();
             self.region_of = vec![0; leaves.max(1)];
             self.now = FIRST;

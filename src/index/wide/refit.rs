@@ -53,7 +53,7 @@ impl Wide {
 
     /// No leaf, for [`Wide::fit_above`].
     pub(super) fn untouched(&self) -> Dirty {
-        Dirty::none(self.levels.first().map_or(0, |leaves| leaves.blocks))
+        Dirty::none(self.occupied.len())
     }
 
     /// Appends vacant leaves, in place as far as there is room.
