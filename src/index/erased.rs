@@ -136,9 +136,9 @@ impl<T: RegionIndex> DynIndex for WithKernel<T> {
 
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
         let mut context = QueryContext::new(Plain, out, cost);
-        let _ = match Dispatched::of(volume) {
-            Ok(planes) => self.index.query(&planes, &mut context),
-            Err(p) => self.index.query(&p, &mut context),
+        let _ = match volume {
+            AnyVolume::Point(p) => self.index.query(&p, &mut context),
+            planes => self.index.query(&Dispatched(planes), &mut context),
         };
     }
 

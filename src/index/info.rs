@@ -140,12 +140,6 @@ impl Info {
         let declared = all.into_iter().filter(|(is_declared, _)| *is_declared);
         declared.map(|(_, name)| name).collect()
     }
-
-    /// The declaration under another name, for a variant with parameters of its own.
-    pub const fn named(mut self, name: &'static str) -> Info {
-        self.name = name;
-        self
-    }
 }
 
 impl<Name> Origin<Name> {
@@ -172,6 +166,19 @@ impl<Name: fmt::Display> fmt::Display for Origin<Name> {
             Origin::Ours => f.write_str("ours"),
             Origin::Crate(name) => write!(f, "crate {name}"),
             Origin::StandIn(of) => write!(f, "stand-in for {of}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Info {
+        /// The same declarations under another name.
+        pub const fn named(mut self, name: &'static str) -> Info {
+            self.name = name;
+            self
         }
     }
 }

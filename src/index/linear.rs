@@ -204,13 +204,11 @@ impl RegionIndex for Linear {
     fn build(input: &Input<'_>, params: &LinearParams) -> Result<Self, BuildError> {
         let items = input.items;
         let ids = indexable(items)?;
-        let mut boxes = BoxBlocks::with_capacity(ids.len());
-        ids.iter().for_each(|&id| boxes.push(&items[id as usize]));
         let cubes = || BallBlocks::of(ids.iter().map(|&id| items[id as usize]));
         Ok(Linear {
             balls: input.spheres.then(cubes),
             is_nearer: false,
-            boxes,
+            boxes: ids.iter().map(|&id| &items[id as usize]).collect(),
             ids: ids[..].into(),
             positions: Positions::default(),
             workers: workers(params.threads, Self::INFO.name)?,

@@ -2,8 +2,6 @@
 //!
 //! A structure is compiled for it once instead of once per volume.
 
-use glam::Vec3;
-
 use super::volume::each_volume;
 use super::{AnyVolume, Predicate, QueryVolume, Recorder};
 use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, Sorted};
@@ -11,17 +9,7 @@ use crate::kernel::Isa;
 
 /// Any volume of planes, with the verdicts and costs of the volume inside, bit for
 /// bit. Points are not among them: some structures search for a point differently.
-pub(crate) struct Dispatched<'a>(AnyVolume<'a>);
-
-impl<'a> Dispatched<'a> {
-    /// `Err` with the point if the volume is one.
-    pub fn of(volume: AnyVolume<'a>) -> Result<Dispatched<'a>, Vec3> {
-        match volume {
-            AnyVolume::Point(p) => Err(p),
-            _ => Ok(Dispatched(volume)),
-        }
-    }
-}
+pub(crate) struct Dispatched<'a>(pub AnyVolume<'a>);
 
 // Not inlined, or all volumes would be compiled into each structure again.
 impl Predicate for Dispatched<'_> {

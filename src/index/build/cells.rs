@@ -260,6 +260,7 @@ impl Splitter for CellSplitter<'_> {
 mod tests {
     use super::*;
     use crate::geometry::ConvexVolume;
+    use crate::index::tree::node::is_leaf;
     use crate::index::{PackedTree, RegionIndex, StructureSpec};
     use crate::query::QueryCost;
 
@@ -331,7 +332,7 @@ mod tests {
         for (counts, height) in [([32; 3], 2), ([40, 64, 48], 0), ([64, 16, 64], 1)] {
             let tree = built(&grid(counts));
             let nodes = 0..tree.nodes().len();
-            let leaves: Vec<usize> = nodes.filter(|&node| tree.is_leaf(node)).collect();
+            let leaves: Vec<usize> = nodes.filter(|&node| is_leaf(tree.nodes(), node)).collect();
             assert!(leaves.len() > 1000, "{}", leaves.len());
             for leaf in leaves {
                 let size = tree.nodes()[leaf].bounds.extent();
@@ -380,7 +381,7 @@ mod tests {
         let tree = built(&items);
         // The world, four towers, sixteen slabs of 62 or 63 each, two of those each.
         assert_eq!(tree.nodes().len(), 1 + 4 + 64 + 128);
-        let leaves = (0..tree.nodes().len()).filter(|&node| tree.is_leaf(node));
+        let leaves = (0..tree.nodes().len()).filter(|&node| is_leaf(tree.nodes(), node));
         let highest = leaves.map(|leaf| tree.nodes()[leaf].bounds.extent().z);
         assert_eq!(highest.fold(0.0, f32::max), 32.0);
     }

@@ -111,12 +111,6 @@ impl PackedTree {
         &self.ids
     }
 
-    /// Returns whether the node has no children.
-    #[inline(always)]
-    pub fn is_leaf(&self, node: usize) -> bool {
-        is_leaf(&self.nodes, node)
-    }
-
     /// The root, and the lanes of the wide nodes below it.
     pub fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
@@ -205,7 +199,7 @@ impl PackedTree {
             for child in children(&self.nodes, node) {
                 self.parents[child] = node as u32;
             }
-            if self.is_leaf(node) {
+            if is_leaf(&self.nodes, node) {
                 self.leaves[self.nodes[node].items()].fill(node as u32);
             }
         }
@@ -214,7 +208,7 @@ impl PackedTree {
     /// Computes a node's bounds from its children, or a leaf's from its items.
     fn fit(&mut self, node: usize) {
         let mut bounds = Aabb::EMPTY;
-        if self.is_leaf(node) {
+        if is_leaf(&self.nodes, node) {
             for position in self.nodes[node].items() {
                 bounds = bounds.union(&self.boxes.get(position));
             }

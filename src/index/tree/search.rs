@@ -86,12 +86,8 @@ impl PackedTree {
         let isa = cx.isa();
         let (wide, ids) = (&self.wide_nodes, self.ids());
         let far = is_far(ids.len());
-        let Scratch {
-            here,
-            below,
-            leaves,
-        } = scratch;
-        let (mut here, mut below) = (here, below);
+        let (mut here, mut below) = (&mut scratch.here, &mut scratch.below);
+        let leaves = &mut scratch.leaves;
         // The root's wide node; or the root itself, if it is a leaf.
         let start = (isa.iota(0), isa.splat_word(mask));
         let is_leaf = wide.blocks.is_empty();

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::node::Stack;
+use super::node::{Stack, is_leaf};
 use super::packed::PackedTree;
 use crate::geometry::Plane;
 use crate::query::{Context, Predicate, Recorder};
@@ -37,7 +37,7 @@ impl Split {
 
     /// Computes how far the two sides of a node reach, from the bounds of its children.
     pub fn fit(&mut self, tree: &PackedTree, node: usize) {
-        if tree.is_leaf(node) {
+        if is_leaf(tree.nodes(), node) {
             return;
         }
         let back = &tree.nodes()[node + 1];
@@ -70,7 +70,7 @@ pub fn locate<C: Context>(
         // An empty tree has no node 0.
         while let Some(node) = nodes.get(at) {
             cx.recorder().nodes_tested(1);
-            if tree.is_leaf(at) {
+            if is_leaf(nodes, at) {
                 tree.test_items(node.items(), (&p, p.mask()), cx)?;
                 break;
             }

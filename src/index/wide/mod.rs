@@ -219,13 +219,7 @@ impl Wide {
             balls: seen_by(self.balls.as_ref(), volume),
             ..self.layer(0)
         };
-        let Scratch {
-            here,
-            below,
-            whole,
-            buckets,
-        } = scratch;
-        let (mut here, mut below) = (here, below);
+        let (mut here, mut below) = (&mut scratch.here, &mut scratch.below);
         let mut traversal = LevelTraversal {
             ids: &self.ids,
             occupied: &self.occupied,
@@ -241,6 +235,7 @@ impl Wide {
             below.clear(here.len());
             let layer = self.layer(level);
             if level == 1 {
+                let whole = &mut scratch.whole;
                 whole.clear(here.len());
                 traversal.sort_last_level(&layer, &leaves, here, below, whole)?;
             } else {
@@ -248,7 +243,7 @@ impl Wide {
             }
             std::mem::swap(&mut here, &mut below);
         }
-        traversal.test_leaves(&leaves, here, buckets)
+        traversal.test_leaves(&leaves, here, &mut scratch.buckets)
     }
 
     /// The whole query where the bounds of all items decide it.
