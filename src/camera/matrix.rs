@@ -24,12 +24,8 @@ named! {
 impl MatrixConvention {
     /// The convention with rows and columns exchanged.
     pub fn transposed(self) -> MatrixConvention {
-        match self {
-            MatrixConvention::ColumnGl => MatrixConvention::RowGl,
-            MatrixConvention::ColumnD3d => MatrixConvention::RowD3d,
-            MatrixConvention::RowGl => MatrixConvention::ColumnGl,
-            MatrixConvention::RowD3d => MatrixConvention::ColumnD3d,
-        }
+        // Rows follow columns, in the same order.
+        MATRIX_CONVENTIONS[(self as usize + 2) % 4].0
     }
 
     /// The entries by this convention as those for column vectors, or the reverse.

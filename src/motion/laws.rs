@@ -137,14 +137,6 @@ fn to_and_fro(x: f64, height: f64) -> f64 {
     turn.min(2.0 * height - turn)
 }
 
-/// The scene that a motion needs, for errors.
-pub(super) fn expected(name: &str) -> &'static str {
-    match name {
-        "traffic" => "a generated city with items in its streets",
-        _ => "a scene with items",
-    }
-}
-
 /// In a direction of its own, at another size.
 pub(super) fn straight(world: &World, id: ItemId, moves: u32, scale: f64) -> Option<Aabb> {
     let b = &world.start[id as usize];

@@ -135,7 +135,11 @@ impl Motion {
         let mut order: Vec<ItemId> = all.filter(|&id| law(&world, id, 1).is_some()).collect();
         if order.is_empty() {
             let found = format!("no item of '{}' can move so", scene.name);
-            return unfit(format!("{found}; expected {}", laws::expected(family.name)));
+            let expected = match family.name {
+                "traffic" => "a generated city with items in its streets",
+                _ => "a scene with items",
+            };
+            return unfit(format!("{found}; expected {expected}"));
         }
         let mut rng = SeededRng::new(seed);
         for i in (1..order.len()).rev() {
