@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{Camera, CameraError, PlaneMethod, Result, require};
+use super::{Camera, CameraError, Frame, Result, require};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::{ConvexVolume, FrustumPlane, Plane, PlaneF64};
 
@@ -52,6 +52,14 @@ pub(super) struct Margin {
     of_frame: bool,
 }
 
+impl Camera {
+    /// The frame about the sum of some points, one after the other.
+    pub(super) fn frame_about(&self, zero: &[DVec3]) -> Frame {
+        let moved = |frame: Frame, zero: &DVec3| frame.relative_to(*zero);
+        zero.iter().fold(self.frame, moved)
+    }
+}
+
 impl Margin {
     /// Coordinates are about the sum of the points `zero`, those of the frame too.
     ///
@@ -64,7 +72,7 @@ impl Margin {
         zero: &[DVec3],
         of_scene: DVec3,
         c: f64,
-        by: PlaneMethod,
+        by_frame: bool,
     ) -> Result<Margin> {
         let are_sound = (0.0..f64::INFINITY).contains(&c) && of_scene.cmpge(DVec3::ZERO).all();
         let found = format_args!("epsilon is {c} and reach {of_scene}");
@@ -103,7 +111,7 @@ impl Margin {
             depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
             derived: [of_named, derived],
-            of_frame: by == PlaneMethod::Frame && lens.matrix().is_none(),
+            of_frame: by_frame && lens.matrix().is_none(),
         })
     }
 
@@ -219,7 +227,7 @@ mod tests {
         let frame = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
         let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
         let camera = Camera { frame, lens };
-        let margin = Margin::new(&camera, &[], DVec3::ONE, 1.0, PlaneMethod::FrameF32).unwrap();
+        let margin = Margin::new(&camera, &[], DVec3::ONE, 1.0, false).unwrap();
         for d in [f32::INFINITY, f32::NEG_INFINITY] {
             let plane = Plane::new(Vec3::Y, d);
             assert_eq!(margin.moved(None, &plane, 0.0).d, d);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::Margin;
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, LensKind, Result};
+use super::{Camera, CameraError, ClipSpace, LensKind, Result};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume,
 };
@@ -114,7 +114,8 @@ impl Camera {
         let of_scene = around.reach.as_dvec3();
         let zero = [around.origin];
         let named = self.derive(&zero, options.method)?;
-        let margin = Margin::new(self, &zero, of_scene, options.epsilon, options.method)?;
+        let by_frame = options.method == PlaneMethod::Frame;
+        let margin = Margin::new(self, &zero, of_scene, options.epsilon, by_frame)?;
         margin.volume(&named, more, of_scene, 0.0)
     }
 
@@ -168,7 +169,7 @@ impl Camera {
             Vec3::ZERO if self.lens.far().is_some() => DVec3::ZERO,
             _ => reach + zero.abs(),
         };
-        let margin = Margin::new(self, &about, of_scene, epsilon, PlaneMethod::Frame)?;
+        let margin = Margin::new(self, &about, of_scene, epsilon, true)?;
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let planes = margin.volume(&named, &more, reach + zero.abs(), of_eye)?;
         Ok(RelativeVolume::new(eye, planes)?)
@@ -176,12 +177,6 @@ impl Camera {
 }
 
 impl Camera {
-    /// The frame about the sum of some points, one after the other.
-    pub(super) fn frame_about(&self, zero: &[DVec3]) -> Frame {
-        let moved = |frame: Frame, zero: &DVec3| frame.relative_to(*zero);
-        zero.iter().fold(self.frame, moved)
-    }
-
     fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         match self.lens.kind() {
             LensKind::Matrix(matrix) => matrix.planes_about(zero),
