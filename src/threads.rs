@@ -93,11 +93,6 @@ impl Workers {
         Ok(Workers { others, threads })
     }
 
-    /// Number of threads.
-    pub fn threads(&self) -> usize {
-        self.threads
-    }
-
     /// [`share`] among these threads, which start within microseconds.
     ///
     /// # Panics

@@ -65,8 +65,6 @@ pub struct Candidate {
     pub rect: Rect,
     /// Position in tree order.
     pub position: u32,
-    /// Lower bound of the least depth.
-    pub depth: f32,
     /// `true` if there is no rectangle, as the box is too near.
     pub near: bool,
 }
@@ -112,7 +110,6 @@ impl Rects {
         Candidate {
             rect: self.get(lane),
             position: position as u32,
-            depth: self.depth[lane],
             near: self.flat >> lane & 1 == 0,
         }
     }

@@ -40,7 +40,7 @@ impl<B: OcclusionBuffer> Work for TwoPass<'_, B> {
             item.is_none_or(|item| self.items.binary_search(&item).is_ok())
         };
         let positions: Vec<usize> = (0..scene.len()).filter(is_given).collect();
-        let mut candidates: Vec<Candidate> = Vec::new();
+        let mut candidates: Vec<(f32, Candidate)> = Vec::new();
         let mut rects = Rects::default();
         for chunk in positions.chunks(LANES) {
             let mut block = BoxBlock::EMPTY;
@@ -50,15 +50,17 @@ impl<B: OcclusionBuffer> Work for TwoPass<'_, B> {
             rects.project(isa, &block, view);
             let lanes = chunk.iter().enumerate();
             let seen = lanes.filter(|(lane, _)| rects.seen >> lane & 1 == 1);
-            candidates.extend(seen.map(|(lane, &position)| rects.candidate(lane, position)));
+            candidates.extend(
+                seen.map(|(lane, &position)| (rects.depth[lane], rects.candidate(lane, position))),
+            );
         }
-        candidates.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+        candidates.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         self.buffer.clear();
-        for candidate in &candidates {
+        for (_, candidate) in &candidates {
             draw(isa, &mut self.buffer, scene, view, candidate);
         }
         let is_kept = |c: &&Candidate| c.near || !self.buffer.hides(isa, &c.rect);
-        let kept = candidates.iter().filter(is_kept);
+        let kept = candidates.iter().map(|(_, c)| c).filter(is_kept);
         kept.filter_map(|c| scene.item(c.position as usize))
             .collect()
     }
