@@ -20,6 +20,21 @@ fn sin_cos(degrees: f64) -> (f64, f64) {
 
 impl Frame {
     /// Slides the eye by `du` right, `dv` up and `dn` backward.
+    ///
+    /// The lecture's example of a camera that is flown:
+    ///
+    /// ```
+    /// use cullbench::camera::look_at;
+    /// use glam::DVec3;
+    ///
+    /// let mut camera = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y)?;
+    /// camera.slide(-1.0, 0.0, -2.0); // forward and left
+    /// camera.roll(30.0);
+    /// camera.yaw(40.0);
+    /// camera.pitch(20.0);
+    /// assert_eq!(camera.eye(), DVec3::new(-1.0, 0.0, -2.0));
+    /// # Ok::<(), cullbench::camera::CameraError>(())
+    /// ```
     pub fn slide(&mut self, du: f64, dv: f64, dn: f64) {
         self.eye += self.u * du + self.v * dv + self.n * dn;
     }
@@ -37,6 +52,22 @@ impl Frame {
     }
 
     /// Lifts the nose for a positive angle: about u.
+    ///
+    /// A level camera that looks along -z and turns by yaw a, then by pitch b, looks
+    /// along (-sin a cos b, sin b, -cos a cos b):
+    ///
+    /// ```
+    /// use cullbench::camera::look_at;
+    /// use glam::DVec3;
+    ///
+    /// let mut camera = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y)?;
+    /// camera.yaw(40.0);
+    /// camera.pitch(20.0);
+    /// let (a, b) = (40f64.to_radians(), 20f64.to_radians());
+    /// let along = DVec3::new(-a.sin() * b.cos(), b.sin(), -a.cos() * b.cos());
+    /// assert!(camera.forward().distance(along) < 1e-15);
+    /// # Ok::<(), cullbench::camera::CameraError>(())
+    /// ```
     pub fn pitch(&mut self, degrees: f64) {
         let (sin, cos) = sin_cos(degrees);
         (self.v, self.n) = (self.v * cos + self.n * sin, self.n * cos - self.v * sin);
