@@ -183,6 +183,7 @@ fn read_beside(
         let entries = zip::entries(&archive, file)?;
         let entry = zip::unpack(&archive, &entries, file, map)?;
         let names = [&format!("{file}#{}", entry.name), name];
+        let named = zip::finder(&entries);
         let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
         let beside = |uri: &str| {
             let mut parts: Vec<&str> = folder.split_terminator('/').collect();
@@ -193,13 +194,12 @@ fn read_beside(
                 }
             }
             let wanted = parts.join("/");
-            let mut listed = entries.iter().map(|(name, _)| name);
-            if !listed.any(|name| name.eq_ignore_ascii_case(&wanted)) {
+            let Some((name, record)) = named(&wanted) else {
                 let found = format!("no '{}' beside it", shortened(&wanted, 80));
                 let expected = "the files that it names";
                 return Err(InputError::at(names[0], "buffers", found, expected));
-            }
-            Ok(zip::unpack(&archive, &entries, file, Some(&wanted))?.bytes)
+            };
+            zip::unpacked(&archive, file, (name, record))
         };
         return read_beside(&entry.bytes, names, entry.map, options, &beside);
     }

@@ -3,7 +3,7 @@
 //! No size is believed before the bytes are there. Buffers of a glTF are entries beside it:
 //! `..` leads no farther than the archive. Source: PKWARE, APPNOTE.TXT 6.3.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
 
 use miniz_oxide::inflate::decompress_to_vec_with_limit;
@@ -54,6 +54,19 @@ pub fn unpack<'w>(
     wanted: Option<&'w str>,
 ) -> Result<Entry<'w>> {
     let (name, record, map) = chosen(entries, file, wanted)?;
+    Ok(Entry {
+        name: plain(name),
+        bytes: unpacked(archive, file, (name, record))?,
+        map,
+    })
+}
+
+/// The bytes of an entry; errors as of [`unpack`].
+pub fn unpacked(
+    archive: &Archive,
+    file: &str,
+    (name, record): (&str, &ZipFileHeaderRecord),
+) -> Result<Vec<u8>> {
     let refused = |found: &dyn Display, expected: &str| {
         let place = format!("entry {}", shortened(name, 80));
         InputError::at(file, &place, found.to_string(), expected)
@@ -87,11 +100,23 @@ pub fn unpack<'w>(
         let expected = format!("{:08x}, as the archive states", claim.crc);
         return Err(refused(&format!("CRC-32 {found:08x}"), &expected));
     }
-    Ok(Entry {
-        name: plain(name),
-        bytes: unpacked,
-        map,
-    })
+    Ok(unpacked)
+}
+
+/// Finds entries: that of the very name, or the last one that differs by case.
+pub fn finder<'e, 'r>(entries: &'e [Named<'r>]) -> impl Fn(&str) -> Option<&'e Named<'r>> {
+    let pairs = |entry: &'e Named<'r>| (&entry.0[..], entry);
+    let exact: HashMap<&str, _> = entries.iter().map(pairs).collect();
+    let folded = entries
+        .iter()
+        .map(|entry| (entry.0.to_ascii_lowercase(), entry));
+    let folded: HashMap<String, _> = folded.collect();
+    move |name| {
+        let found = exact.get(name);
+        found
+            .or_else(|| folded.get(&name.to_ascii_lowercase()))
+            .copied()
+    }
 }
 
 /// An entry by its name.
@@ -136,17 +161,12 @@ fn ends_in(name: &str, endings: &[&str]) -> bool {
 }
 
 /// The entry of a name, or the only scene, and the map within it.
-///
-/// Without an entry of that very name, the last one that differs by case.
 fn chosen<'e, 'r, 'w>(
     entries: &'e [Named<'r>],
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>)> {
-    let named = |wanted: &str| {
-        let last = |is_it: &dyn Fn(&str) -> bool| entries.iter().rfind(|(name, _)| is_it(name));
-        last(&|name| name == wanted).or_else(|| last(&|name| name.eq_ignore_ascii_case(wanted)))
-    };
+    let named = finder(entries);
     let whole = wanted.map(|wanted| (wanted, None));
     let text = wanted.unwrap_or_default();
     let signs = text.rmatch_indices('#');

@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use self::block_order::block_ordered;
+use self::block_order::{SHARED_POINTS, block_ordered};
 use self::level_traversal::LevelTraversal;
 use self::levels::{Layer, Level};
 use self::single_plane_buckets::SinglePlaneBuckets;
@@ -162,6 +162,7 @@ impl Wide {
         let jobs = leaves
             .chunks_mut(SHARED_BLOCKS)
             .zip(parents.chain(std::iter::once(&mut [][..])));
+        let threads = threads.min(ids.len() / SHARED_POINTS);
         share(threads, jobs.enumerate(), |(i, (leaves, parents))| {
             fill(items, ids, i * SHARED_BLOCKS, leaves);
             unite(leaves, parents);
