@@ -249,7 +249,7 @@ fn a_program_that_hangs_in_a_pair_is_one_error_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let program = folder.path().join("other");
     let script = format!(
-        "#!/bin/sh\nif [ -e counted ]; then\n  printf '{{\"ready\":{{\"protocol\":6}}}}\\n'\n  \
+        "#!/bin/sh\nif [ -e counted ]; then\n  printf '{{\"ready\":{{\"protocol\":7}}}}\\n'\n  \
          exec sleep 60\nfi\n: > counted\nexec {} \"$@\"\n",
         crate::PROGRAM
     );
