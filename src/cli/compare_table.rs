@@ -175,6 +175,11 @@ impl CompareTable<'_> {
         }
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
+        if self.args.gate == Gate::Time && changes.only_in_old.len() + changes.only_in_new.len() > 0
+        {
+            let other = "beside other structures, those in both may take other times";
+            lines.push(other.to_owned());
+        }
         lines.extend(self.advice());
         if rows.is_empty() && !all && room.is_some() {
             lines.push("every cell with its change: --all".to_owned());
@@ -444,10 +449,7 @@ pub fn counted(cells: &[Lone]) -> String {
 
 /// How many cells only one side has; each that is wrong by its name.
 fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
-    let all = (!cells.is_empty()).then(|| {
-        let company = "beside which the others may take other times";
-        format!("only in {side}: {}, {company}", counted(cells))
-    });
+    let all = (!cells.is_empty()).then(|| format!("only in {side}: {}", counted(cells)));
     let wrong = cells.iter().filter(|cell| cell.status.is_failure());
     let wrong = wrong.map(|cell| {
         let (name, status) = (name(&cell.cell), cell.status.name());

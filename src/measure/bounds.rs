@@ -62,7 +62,7 @@ fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'
     // would be always the same few cache lines.
     // Multiples of 2^32 / golden ratio spread them (Knuth, TAOCP vol. 3, sec. 6.4).
     let scattered = |place: usize| (place as u32).wrapping_mul(0x9E37_79B9) as usize;
-    let start = |(place, length)| scattered(place) % (count + 1 - length);
+    let start = |(place, &length)| scattered(place) % (count + 1).saturating_sub(length).max(1);
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
     lengths.iter().any(|&length| length > 0).then(|| {
         TimedTask::new(visible.to_vec(), move |place, out| {

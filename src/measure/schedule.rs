@@ -112,10 +112,12 @@ impl Schedule {
         let plans = tasks.iter().map(|task| {
             // A panic is the task's own result when its pass comes.
             let pilot = guarded(|| pilot(task, &cameras, &mut out)).unwrap_or(1.0);
+            let enough = batch(task.least_ns.unwrap_or(pilot), timed);
             let batch = match (&task.ask_many, protocol.cold) {
-                (Some(_), _) => timed,
+                (Some(_), true) => timed,
+                (Some(_), false) => enough.next_multiple_of(timed),
                 (None, true) => 1,
-                (None, false) => batch(task.least_ns.unwrap_or(pilot), timed),
+                (None, false) => enough,
             };
             let pass = 2.0 * (pilot * timed.max(batch) as f64).max(1.0);
             let rounds = match protocol.cold {

@@ -77,10 +77,12 @@ pub(super) fn for_visible_share(
     let search = |items: &[Aabb]| {
         let mut low = 1e-4;
         // A near that grows with far loses what is close, so a smaller scale may show more.
-        let (mut high, mut most, mut largest) = (4.0, visible(items, 4.0)?, 0.0);
+        let (mut high, mut most) = (4.0, visible(items, 4.0)?);
+        let mut largest = most;
         while most < share && high > 4.0 * low {
-            (high, largest) = (high / 4.0, most.max(largest));
+            high /= 4.0;
             most = visible(items, high)?;
+            largest = most.max(largest);
         }
         if most < share {
             let found = format!("at most {}%", significant(largest * 100.0));
@@ -107,6 +109,9 @@ pub(super) fn for_visible_share(
         Ok(high)
     };
     let found = search(&regular);
+    if regular.len() == scene.items.len() {
+        return found;
+    }
     // Files that repeat themselves may have one kind of item at every n-th place.
     let scattered = scattered(&scene.items, regular.len());
     let share_of = |scale: &f64| visible(&scattered, *scale).ok();

@@ -92,11 +92,15 @@ impl Rows {
 /// Reads all rows; bad is also a bound beyond `limit`.
 fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
-    let is_centre = |name: &String| name.to_lowercase().starts_with("cent");
+    let is_centre = |name: &String| {
+        let name = name.to_lowercase();
+        name.starts_with("cent") && name.ends_with('x')
+    };
     if table.column(BOUNDS[0]).is_none() && table.header.iter().any(is_centre) {
         let half = "min = centre - half the size, max = centre + half the size";
         let expected = format!("a header with {}: {half}", BOUNDS.join(","));
-        return Err(table.error("centres in place of bounds", expected));
+        let header = shortened(&table.header.join(","), 80);
+        return Err(table.error(format!("centres in place of bounds: '{header}'"), expected));
     }
     let columns = table.columns(&BOUNDS)?;
     let others = table.header.iter().enumerate();
@@ -196,7 +200,7 @@ mod tests {
             ("a,b,c\n1,2,3\n".into(), "line 1: no column 'min_x'"),
             (
                 "Center.x,center_y,center_z,extent_x,extent_y,extent_z\n".into(),
-                "line 1: centres in place of bounds; expected a header with min_x,",
+                "line 1: centres in place of bounds: 'Center.x,center_y,",
             ),
             (
                 format!("{header}\n1,2,3,4,five,6\n"),

@@ -53,6 +53,7 @@ pub fn read_obj(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> 
         points: Vec::new(),
         corners: Vec::new(),
         items: vec![(String::new(), 0)],
+        object: String::new(),
         unread: BTreeSet::new(),
     };
     let (mut rest, mut number) = (text(bytes), 1);
@@ -120,6 +121,8 @@ struct Obj<'f> {
     corners: Vec<[u32; 3]>,
     /// Name and first triangle; the last item may have no triangles yet.
     items: Vec<(String, usize)>,
+    /// Name of the object that is being read.
+    object: String,
     unread: BTreeSet<String>,
 }
 
@@ -171,10 +174,12 @@ impl Obj<'_> {
                 let plain = |line: &str| line.trim().trim_end_matches('\\').trim().to_owned();
                 let lines: Vec<String> = name.lines().map(plain).collect();
                 let mut name = lines.join(" ").trim().to_owned();
-                let unused = self.items.pop_if(|(_, first)| *first == self.corners.len());
-                // A group without a name is a part of the object before it.
-                if name.is_empty() {
-                    name = unused.unwrap_or_default().0;
+                self.items.pop_if(|(_, first)| *first == self.corners.len());
+                match word {
+                    b"o" => self.object.clone_from(&name),
+                    // A group without a name is a part of its object.
+                    _ if name.is_empty() => name.clone_from(&self.object),
+                    _ => {}
                 }
                 self.items.push((name, self.corners.len()));
             }
@@ -309,10 +314,15 @@ f 1 2 3 4";
 
     #[test]
     fn a_group_without_a_name_is_of_the_object_before_it() {
-        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\no house\ng\nf 1 2 3\ng\nf 1 3 2\n";
-        let scene = read(text.as_bytes()).unwrap();
-        let names = [0, 1].map(|item| scene.labels[0].get(item).to_owned());
-        assert_eq!(names, ["house", ""]);
+        let points = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        for (groups, wanted) in [
+            ("o house\ng\nf 1 2 3\ng\nf 1 3 2\n", ["house"; 2]),
+            ("o house\ng roof\ng\nf 1 2 3\no\nf 1 3 2\n", ["house", ""]),
+        ] {
+            let scene = read(format!("{points}{groups}").as_bytes()).unwrap();
+            let names = [0, 1].map(|item| scene.labels[0].get(item).to_owned());
+            assert_eq!(names, wanted);
+        }
     }
 
     #[test]
