@@ -8,27 +8,15 @@ use glam::DVec3;
 
 use super::graph::{Ground, RegionGraph, RegionId};
 use super::row::Pvs;
-use crate::scene::{BspChild, LeafNode, QuakeMap, WorldBox};
+use crate::scene::{BspChild, QuakeMap, WorldBox};
 
 /// Map units by which boxes are grown: map compilers round corners and planes.
 const SLACK: f64 = 0.125;
 
-/// The ground of a map.
-#[derive(Debug)]
-struct LeafGround(Arc<QuakeMap>);
-
-/// Which sides of a node a box may meet, the front first.
-fn sides(node: &LeafNode, b: &WorldBox) -> [bool; 2] {
-    let (centre, half) = ((b.min + b.max) / 2.0, (b.max - b.min) / 2.0 + SLACK);
-    // Signed distances from the plane, in lengths of its normal.
-    let (normal, distance) = (node.normal.as_dvec3(), f64::from(node.distance));
-    let (at, reach) = (normal.dot(centre) - distance, normal.abs().dot(half));
-    [at + reach >= 0.0, at - reach <= 0.0]
-}
-
-impl Ground for LeafGround {
+impl Ground for QuakeMap {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let tree = &self.0.tree;
+        let tree = &self.tree;
+        let (centre, half) = ((b.min + b.max) / 2.0, (b.max - b.min) / 2.0 + SLACK);
         let (mut inside, mut open) = (true, vec![BspChild::Node(0)]);
         while let Some(at) = open.pop() {
             match at {
@@ -39,8 +27,12 @@ impl Ground for LeafGround {
                 }
                 BspChild::Node(node) => {
                     let node = &tree.nodes[node as usize];
-                    let met = node.children.into_iter().zip(sides(node, b));
-                    open.extend(met.filter_map(|(child, is_met)| is_met.then_some(child)));
+                    // Signed distances from the plane, in lengths of its normal.
+                    let (normal, distance) = (node.normal.as_dvec3(), f64::from(node.distance));
+                    let (at, reach) = (normal.dot(centre) - distance, normal.abs().dot(half));
+                    let [front, back] = node.children;
+                    open.extend((at + reach >= 0.0).then_some(front));
+                    open.extend((at - reach <= 0.0).then_some(back));
                 }
             }
         }
@@ -52,7 +44,7 @@ impl RegionGraph {
     /// The clusters of a map.
     pub fn of_quake(map: &Arc<QuakeMap>) -> RegionGraph {
         let parts = vec![Vec::new(); map.clusters];
-        RegionGraph::new(parts, Vec::new(), Arc::new(LeafGround(map.clone())))
+        RegionGraph::new(parts, Vec::new(), map.clone())
     }
 }
 

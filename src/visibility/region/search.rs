@@ -5,7 +5,7 @@
 //! of potentially visible sets").
 
 use super::graph::{RegionGraph, RegionId};
-use super::view::{View, Window};
+use super::view::{Window, window_of};
 use crate::index::IdSet;
 use crate::visibility::Rays;
 
@@ -26,13 +26,12 @@ pub struct Search {
 impl Search {
     /// Adds the regions that are seen from those of the eye, these among them.
     pub fn run(&mut self, graph: &RegionGraph, rays: &Rays, homes: &[RegionId], seen: &mut IdSet) {
-        let view = &View::of(rays);
         self.entries.clear();
         let regions = graph.len().max(self.windows.len());
         self.windows.resize_with(regions, Vec::new);
         for &home in homes {
-            if !self.is_entered(seen, home, view.window) {
-                self.enter(home, view.window);
+            if !self.is_entered(seen, home, rays.window) {
+                self.enter(home, rays.window);
             }
         }
         let mut next = 0;
@@ -40,17 +39,17 @@ impl Search {
             next += 1;
             for &exit in &graph.exits[region as usize] {
                 let opening = &graph.openings[exit as usize];
-                let Some(entered) = opening.entered(region, view.eye) else {
+                let Some(entered) = opening.entered(region, rays.camera.frame.eye) else {
                     continue;
                 };
-                let covered = view.rectangle(opening);
+                let covered = window_of(rays, opening);
                 let Some(narrowed) = covered.and_then(|covered| common(window, covered)) else {
                     continue;
                 };
                 if !self.is_entered(seen, entered, narrowed) {
                     let window = match self.windows[entered as usize].len() < MOST_WINDOWS {
                         true => narrowed,
-                        false => view.window,
+                        false => rays.window,
                     };
                     self.enter(entered, window);
                 }
