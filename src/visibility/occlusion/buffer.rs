@@ -2,7 +2,7 @@
 //!
 //! Occluders are drawn into them and rectangles are tested, in turn.
 
-use super::outline::{Coverage, Outline};
+use super::outline::Outline;
 use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
 use super::view::View;
@@ -11,8 +11,8 @@ use crate::visibility::SampleGrid;
 
 /// A depth buffer of occluders.
 pub trait OcclusionBuffer {
-    /// The pixels of an occluder that are drawn.
-    const COVERAGE: Coverage;
+    /// True if pixels are drawn that an occluder covers wholly, else by their centres.
+    const COVERS_WHOLE: bool;
 
     /// An empty buffer.
     fn new(grid: SampleGrid) -> Self;
@@ -50,7 +50,7 @@ pub fn draw<I: Isa, B: OcclusionBuffer>(
     let mut drawn = 0;
     for occluder in scene.occluders(position) {
         let open = view.open & occluder.faces;
-        let Some(mut outline) = Outline::of(&occluder.inner, open, view, B::COVERAGE) else {
+        let Some(mut outline) = Outline::of(&occluder.inner, open, view, B::COVERS_WHOLE) else {
             continue;
         };
         if !candidate.near {

@@ -11,7 +11,6 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::buffer::{CullStats, OcclusionBuffer, draw};
-use super::outline::Coverage;
 use super::rect::{Candidate, Rect, Rects};
 use super::scene::OccluderScene;
 use super::view::View;
@@ -39,11 +38,9 @@ pub struct Interleaved<B> {
 /// A block that is still to be opened.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    rect: Rect,
-    block: u32,
+    /// Its box; its number is the position.
+    block: Candidate,
     level: u16,
-    /// `true` if there is no rectangle.
-    near: bool,
     open: PlaneMask,
     /// How many occluders had been drawn when the rectangle was looked at.
     drawn: u32,
@@ -112,10 +109,12 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         queue.push(Reverse((0, 0)));
         entries.clear();
         entries.push(Entry {
-            rect: Rect::default(),
-            block: 0,
+            block: Candidate {
+                rect: Rect::default(),
+                position: 0,
+                near: true,
+            },
             level: (scene.levels.len() - 1) as u16,
-            near: true,
             open: view.volume.mask(),
             drawn: 0,
         });
@@ -126,11 +125,11 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         while let Some(Reverse((_, place))) = queue.pop() {
             let entry = entries[place as usize];
             // Much may have been drawn since it was put there.
-            let again = !entry.near && entry.drawn < stats.drawn as u32;
-            if again && buffer.hides(isa, &entry.rect) {
+            let again = !entry.block.near && entry.drawn < stats.drawn as u32;
+            if again && buffer.hides(isa, &entry.block.rect) {
                 continue;
             }
-            let (level, index) = (usize::from(entry.level), entry.block as usize);
+            let (level, index) = (usize::from(entry.level), entry.block.position as usize);
             let block = &scene.levels[level].blocks()[index];
             let mut lanes = scene.lanes(level, index);
             if level > 0 {
@@ -149,17 +148,16 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             let (seen, flat) = (rects.seen, rects.flat);
             lanes &= seen;
             lanes &= !buffer.hides_lanes(isa, &rects, lanes & flat);
+            let below = |lane: usize| rects.candidate(lane, index * LANES + lane);
             if level > 0 {
                 for lane in Bits(lanes.into()) {
                     let lane = lane as usize;
-                    let (level, block) = (entry.level - 1, (index * LANES + lane) as u32);
-                    let key = key(depth_bits(rects.depth[lane]), level, block);
+                    let (level, block) = (entry.level - 1, below(lane));
+                    let key = key(depth_bits(rects.depth[lane]), level, block.position);
                     queue.push(Reverse((key, entries.len() as u32)));
                     entries.push(Entry {
-                        rect: rects.get(lane),
                         block,
                         level,
-                        near: flat >> lane & 1 == 0,
                         open: open[lane],
                         drawn: stats.drawn as u32,
                     });
@@ -167,13 +165,12 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 continue;
             }
             // Occluders come first, the nearest before the others: they may hide them.
-            let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERAGE, least_area));
+            let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERS_WHOLE, least_area));
             let mut order = [0; LANES];
             let count = by_depth(&rects.depth, large, &mut order);
-            let survivor = |lane: usize| rects.candidate(lane, index * LANES + lane);
             let mut drawn = 0;
             for &key in &order[..count] {
-                let item = survivor((key & 15) as usize);
+                let item = below((key & 15) as usize);
                 if drawn > 0 && !item.near && buffer.hides(isa, &item.rect) {
                     continue;
                 }
@@ -190,7 +187,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 left &= !buffer.hides_lanes(isa, &rects, left);
             }
             for lane in Bits(left.into()) {
-                survivors.push(survivor(lane as usize));
+                survivors.push(below(lane as usize));
             }
             stats.drawn += drawn;
         }
@@ -238,11 +235,8 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
 ///
 /// A rectangle is rounded outward, so the pixels at its rim are covered in part.
 #[inline(always)]
-fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32) -> LaneMask {
-    let rim = match coverage {
-        Coverage::Centre => 0,
-        Coverage::Whole => 1,
-    };
+fn coverable_from<I: Isa>(isa: I, rects: &Rects, whole: bool, pixels: u32) -> LaneMask {
+    let rim = i32::from(whole);
     let mut enough = [0; LANES];
     for (lane, enough) in enough.iter_mut().enumerate() {
         let across = (rects.x1[lane] - rects.x0[lane] - rim).max(0) as u32;

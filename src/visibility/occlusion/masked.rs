@@ -7,7 +7,7 @@
 //! tell the two back ends apart.
 
 use super::buffer::OcclusionBuffer;
-use super::outline::{Coverage, Nearness, Outline};
+use super::outline::{Nearness, Outline};
 use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
 use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
@@ -38,7 +38,7 @@ pub type MaskedInner = Masked<true>;
 pub type MaskedCentre = Masked<false>;
 
 impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
-    const COVERAGE: Coverage = [Coverage::Centre, Coverage::Whole][WHOLE as usize];
+    const COVERS_WHOLE: bool = WHOLE;
 
     fn new(grid: SampleGrid) -> Self {
         let columns = (grid.width as usize).div_ceil(TILE_WIDTH);

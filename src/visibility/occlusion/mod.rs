@@ -24,7 +24,7 @@ mod view;
 pub use buffer::{CullStats, OcclusionBuffer};
 pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
-pub use outline::{Coverage, Outline};
+pub use outline::Outline;
 pub use rect::{Candidate, Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
 pub use view::{Linear, Projection, View};

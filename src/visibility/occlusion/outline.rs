@@ -41,15 +41,6 @@ use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
 use crate::kernel::each;
 
-/// Which pixels an outline covers.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Coverage {
-    /// Those whose centre is within it.
-    Centre,
-    /// Those that are wholly within it.
-    Whole,
-}
-
 /// A bound of the columns: `at + slope * row`, rounded inward.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bound {
@@ -81,14 +72,15 @@ pub struct Outline {
     /// Columns of the padded image.
     columns: f64,
     height: f64,
-    coverage: Coverage,
+    /// True if it covers the pixels that are wholly within it, else by their centres.
+    covers_whole: bool,
 }
 
 impl Outline {
     /// The outline of a box; `None` where it covers no pixel or the eye is in it.
     /// Those faces that are `open` are drawn as if they lay infinitely far out.
     #[inline(always)]
-    pub fn of(inner: &Aabb, open: Faces, view: &View, coverage: Coverage) -> Option<Outline> {
+    pub fn of(inner: &Aabb, open: Faces, view: &View, covers_whole: bool) -> Option<Outline> {
         if inner.is_empty() {
             return None;
         }
@@ -115,7 +107,7 @@ impl Outline {
             face_count: 0,
             floor: 0.0,
             columns,
-            coverage,
+            covers_whole,
         };
         match view.parallel {
             true => outline.add_parallel(low, high, view),
@@ -200,9 +192,9 @@ impl Outline {
     fn keep(&mut self, edge: Linear, margin: f64) {
         let Linear { x, y, c } = edge;
         let c = c - margin
-            + match self.coverage {
-                Coverage::Whole => x.min(0.0) + y.min(0.0),
-                Coverage::Centre => 0.5 * (x + y),
+            + match self.covers_whole {
+                true => x.min(0.0) + y.min(0.0),
+                false => 0.5 * (x + y),
             };
         if x.abs() * self.columns >= margin {
             // In f32: u of each term for rounding it, u of the product, u of both for

@@ -113,7 +113,7 @@ pub struct View<'v> {
     pub far: f64,
     /// A box that holds all points of rays before the near plane (perspective lenses).
     pub before_near: [DVec3; 2],
-    /// The faces of the scene's bounds beyond which no ray comes back: see
+    /// The faces of the scene's bounds that no ray passes and comes back through: see
     /// `outline`.
     pub open: Faces,
     /// For the boxes of a block.
@@ -169,7 +169,14 @@ impl<'v> View<'v> {
             near,
             far: camera.lens.far().unwrap_or(f64::INFINITY),
             before_near: before_near(rays, near, eye, far_from_zero),
-            open: open_faces(frame.eye, forward, parallel, scene),
+            // Those that the eye is not beyond, or that parallel rays do not leave by.
+            open: match parallel {
+                true => faces(forward.cmple(DVec3::ZERO), forward.cmpge(DVec3::ZERO)),
+                false => faces(
+                    frame.eye.cmpge(scene.bounds.min),
+                    frame.eye.cmple(scene.bounds.max),
+                ),
+            },
             projection: Projection::new(rays, eye, far_from_zero, grid),
         }
     }
@@ -212,16 +219,6 @@ fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3
     let width = near * (1.0 + left.abs() + right.abs() + bottom.abs() + top.abs());
     let slack = DVec3::splat((far_from_zero + width) * MARGIN);
     [low - slack, high + slack]
-}
-
-/// The faces of the scene's bounds that no ray passes and comes back through:
-/// those that the eye is not beyond, or that parallel rays do not leave by.
-fn open_faces(eye: DVec3, forward: DVec3, parallel: bool, scene: &OccluderScene) -> Faces {
-    let bounds = &scene.bounds;
-    match parallel {
-        true => faces(forward.cmple(DVec3::ZERO), forward.cmpge(DVec3::ZERO)),
-        false => faces(eye.cmpge(bounds.min), eye.cmple(bounds.max)),
-    }
 }
 
 impl Projection {

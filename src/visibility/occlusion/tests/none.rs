@@ -1,7 +1,7 @@
 //! No occlusion at all: what leaving the stage out keeps.
 
 use super::super::buffer::OcclusionBuffer;
-use super::super::outline::{Coverage, Outline};
+use super::super::outline::Outline;
 use super::super::rect::{Rect, Rects};
 use crate::kernel::{Isa, LaneMask};
 use crate::visibility::SampleGrid;
@@ -12,7 +12,7 @@ use crate::visibility::SampleGrid;
 pub struct NoOcclusion;
 
 impl OcclusionBuffer for NoOcclusion {
-    const COVERAGE: Coverage = Coverage::Whole;
+    const COVERS_WHOLE: bool = true;
 
     fn new(_: SampleGrid) -> Self {
         NoOcclusion

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::{Coverage, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
+use super::super::{MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer};
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
 use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
@@ -101,7 +101,7 @@ fn losses<B: OcclusionBuffer>(
                     "only what is in the view"
                 );
                 let lost_here = missing(&seen, &kept);
-                if !lost_here.is_empty() && B::COVERAGE == Coverage::Whole {
+                if !lost_here.is_empty() && B::COVERS_WHOLE {
                     println!(
                         "{} seed {seed}: lost {lost_here:?} of {seen:?}",
                         std::any::type_name::<B>()

@@ -3,7 +3,7 @@
 //! One depth per pixel, at its centre; every pixel of a box is tested.
 
 use super::super::buffer::OcclusionBuffer;
-use super::super::outline::{Coverage, Outline};
+use super::super::outline::Outline;
 use super::super::rect::{Rect, Rects};
 use crate::kernel::{Isa, LANES, LaneMask, first_lanes};
 use crate::query::Bits;
@@ -17,7 +17,7 @@ pub struct ZBuffer {
 }
 
 impl OcclusionBuffer for ZBuffer {
-    const COVERAGE: Coverage = Coverage::Centre;
+    const COVERS_WHOLE: bool = false;
 
     fn new(grid: SampleGrid) -> Self {
         ZBuffer {
