@@ -50,6 +50,15 @@ impl Ray {
     pub fn at(&self, depth: f64) -> DVec3 {
         self.origin + self.direction * depth
     }
+
+    /// Returns `true` if a depth between two bounds is from near to far.
+    ///
+    /// Where the bounds leave it open, `compare` decides: the depth against another.
+    #[inline(always)]
+    pub fn reaches(&self, [least, most]: [f64; 2], compare: impl Fn(f64) -> Ordering) -> bool {
+        let is_before = least < self.near && compare(self.near).is_lt();
+        !is_before && !(most > self.far && compare(self.far).is_gt())
+    }
 }
 
 /// All rays of a camera.

@@ -52,19 +52,19 @@ pub fn children(nodes: &[TreeNode], node: usize) -> impl Iterator<Item = usize> 
 }
 
 /// Open subtrees kept without the heap: enough for any balanced tree.
-const NEAR: usize = 64;
+pub const NEAR: usize = 48;
 
-/// Open nodes of a depth-first traversal.
-pub struct Stack {
-    near: [u32; NEAR],
-    used: usize,
+/// Open nodes of a traversal.
+pub struct Stack<T = u32> {
+    pub near: [T; NEAR],
+    pub used: usize,
     /// Deeper levels of degenerate trees.
-    far: Vec<u32>,
+    pub far: Vec<T>,
 }
 
-impl Stack {
+impl<T: Copy> Stack<T> {
     #[inline(always)]
-    pub fn new(root: u32) -> Self {
+    pub fn new(root: T) -> Self {
         Stack {
             near: [root; NEAR],
             used: 1,
@@ -73,7 +73,7 @@ impl Stack {
     }
 
     #[inline(always)]
-    pub fn pop(&mut self) -> Option<u32> {
+    pub fn pop(&mut self) -> Option<T> {
         if let Some(top) = self.far.pop() {
             return Some(top);
         }
@@ -82,7 +82,7 @@ impl Stack {
     }
 
     #[inline(always)]
-    pub fn push(&mut self, node: u32) {
+    pub fn push(&mut self, node: T) {
         if let Some(slot) = self.near.get_mut(self.used) {
             *slot = node;
             self.used += 1;

@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::slabs::Slabs;
 use crate::arithmetic::cross_sizes;
 use crate::geometry::{Aabb, BoxBlock};
-use crate::index::{Record, by_surface_area};
+use crate::index::{NEAR, Record, Stack, by_surface_area};
 use crate::kernel::{Isa, LANES, LaneMask};
 use crate::query::{Bits, ItemId};
 use crate::visibility::Ray;
@@ -106,7 +106,8 @@ impl RayTree {
             true => black_box(slabs),
             false => slabs,
         };
-        let mut open = Open::new();
+        let mut open = Stack::new((0.0, 0));
+        open.used = 0;
         if self.nodes.is_empty() {
             return;
         }
@@ -185,27 +186,8 @@ pub fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     turned.cmpgt(cross_sizes(half, d.abs())).any()
 }
 
-/// Nodes kept without the heap.
-const NEAR: usize = 48;
-
 /// Nodes still to be visited, the nearest of each node's children last.
-struct Open {
-    near: [(f32, u32); NEAR],
-    used: usize,
-    /// Nodes that do not fit.
-    far: Vec<(f32, u32)>,
-}
-
-impl Open {
-    #[inline(always)]
-    fn new() -> Open {
-        Open {
-            near: [(0.0, 0); NEAR],
-            used: 0,
-            far: Vec::new(),
-        }
-    }
-
+impl Stack<(f32, u32)> {
     /// Adds a node to those from `first` on, which are sorted.
     #[inline(always)]
     fn push_sorted(&mut self, first: usize, node: (f32, u32)) {
@@ -221,15 +203,6 @@ impl Open {
             at -= 1;
         }
         self.near[at] = node;
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<(f32, u32)> {
-        if let Some(last) = self.far.pop() {
-            return Some(last);
-        }
-        self.used = self.used.checked_sub(1)?;
-        Some(self.near[self.used % NEAR])
     }
 }
 
