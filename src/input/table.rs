@@ -225,6 +225,14 @@ impl Row<'_> {
         Ok(numbers)
     }
 
+    /// Seconds, which do not lie before the `last`.
+    pub fn time(&self, column: usize, last: f64) -> Result<f64> {
+        let time = self.finite_number(column)?;
+        let found = || format!("time_s {time} after {last}");
+        let error = || self.error(found(), "times in ascending order");
+        (time >= last).then_some(time).ok_or_else(error)
+    }
+
     /// An error at this row.
     pub fn error(&self, found: impl Display, expected: impl Display) -> InputError {
         InputError::line(&self.table.file, self.line, found, expected)

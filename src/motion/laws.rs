@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use crate::geometry::Aabb;
 use crate::input::is_readable;
 use crate::query::ItemId;
-use crate::scene::{COUNT, CityGrid, Scene, UpAxis, mix64};
+use crate::scene::{COUNT, CityGrid, Scene, UpAxis, mix64, on_sphere};
 use crate::spec::Spec;
 
 /// Bounds of a removed item: an empty box with finite bounds.
@@ -86,9 +86,7 @@ impl World {
     /// A direction of an item, uniform on the sphere.
     fn direction(&self, id: ItemId) -> DVec3 {
         let z = 2.0 * self.unit(id, 1) - 1.0;
-        let (turn, radius) = (TAU * self.unit(id, 2), (1.0 - z * z).sqrt());
-        let of_z_up = DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z);
-        self.up.from_z_up(of_z_up)
+        self.up.from_z_up(on_sphere(z, TAU * self.unit(id, 2)))
     }
 
     /// Step of an item, in its own sizes.

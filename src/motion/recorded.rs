@@ -148,16 +148,12 @@ pub(super) fn read_motion_csv(
     let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
     while let Some(row) = table.next_row() {
         let row = row?;
-        let time = row.finite_number(time_at)?;
-        match recorded.times.last() {
-            Some(&before) if time < before => {
-                let found = format!("time_s {time} after {before}");
-                return Err(row.error(found, "times in ascending order".to_owned()));
-            }
-            Some(&before) if time > before => recorded.end_frame(&mut rows, file)?,
-            _ => (),
+        let last = recorded.times.last().copied();
+        let time = row.time(time_at, last.unwrap_or(f64::NEG_INFINITY))?;
+        if last.is_some_and(|last| time > last) {
+            recorded.end_frame(&mut rows, file)?;
         }
-        if recorded.times.last() != Some(&time) {
+        if last != Some(time) {
             recorded.times.push(time);
         }
         rows.push((

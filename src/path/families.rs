@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Pose, Stage, thin, unfit};
 use crate::camera::Frame;
 use crate::input::{Result, note};
-use crate::scene::{CameraPlace, PlaceView};
+use crate::scene::{CameraPlace, PlaceView, on_sphere};
 use crate::shown::counted;
 use crate::spec::Spec;
 
@@ -130,10 +130,7 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let distance = 4.0 * stage.radius();
     let pose = |turn: f64| {
         let i = turn * stage.count as f64;
-        let z = 0.98 * (1.0 - 2.0 * turn);
-        let ring = (1.0 - z * z).sqrt();
-        let (x, y) = (libm::cos(i * GOLDEN_ANGLE), libm::sin(i * GOLDEN_ANGLE));
-        let arm = DVec3::new(ring * x, ring * y, z);
+        let arm = on_sphere(0.98 * (1.0 - 2.0 * turn), i * GOLDEN_ANGLE);
         Pose::new(stage.centre() + arm * distance, -arm)
     };
     Ok(stage.turns().map(pose).collect())

@@ -99,13 +99,8 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
     let (clock, mut last, mut times) = (table.column("time_s"), f64::NEG_INFINITY, Vec::new());
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = rows(&mut table, file, "no camera", |row| {
         if let Some(column) = clock.filter(|column| !row.text(*column).is_empty()) {
-            let time = row.finite_number(column)?;
-            if time < last {
-                let found = format!("time_s {time} after {last}");
-                return Err(row.error(found, "times in ascending order"));
-            }
-            last = time;
-            times.push(time);
+            last = row.time(column, last)?;
+            times.push(last);
         }
         let camera = read(row)?.map_err(|error| refused(row, &error))?;
         Ok((row.line, camera))

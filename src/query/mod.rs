@@ -26,7 +26,6 @@ pub use volume::{AnyVolume, QueryVolume};
 pub type ItemId = u32;
 
 /// Every value once, ascending.
-#[cfg(feature = "cli")]
 pub(crate) fn distinct<T: Ord>(mut values: Vec<T>) -> Vec<T> {
     values.sort_unstable();
     values.dedup();

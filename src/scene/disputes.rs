@@ -7,6 +7,8 @@
 
 use std::cmp::Ordering;
 
+use crate::query::distinct;
+
 /// A linedef as the file has it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Linedef {
@@ -99,9 +101,7 @@ fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)
     let mut edges: Vec<Edge> = edges.collect();
     edges.sort_by_key(|edge| edge.ends[0][1]);
     let ends = edges.iter().flat_map(|edge| edge.ends);
-    let mut levels: Vec<i64> = ends.map(|end| end[1]).collect();
-    levels.sort_unstable();
-    levels.dedup();
+    let levels: Vec<i64> = distinct(ends.map(|end| end[1]).collect());
     let (mut waiting, mut strip) = (edges.iter().peekable(), Vec::<&Edge>::new());
     for level in levels.windows(2) {
         let [low, high] = [level[0], level[1]];

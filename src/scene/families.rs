@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::WorldBox;
-use super::rng::{SeededRng, fractal, mix64, octaves};
+use super::rng::{SeededRng, fractal, mix64, octaves, on_sphere};
 use crate::spec::{Spec, SpecError};
 
 /// The boxes of a family, or a parameter that is wrong.
@@ -221,9 +221,7 @@ pub fn shell(spec: &mut Spec, n: usize, _: &mut SeededRng) -> Made {
     let boxes = (0..n).map(|i| {
         let z = 1.0 - 2.0 * (i as f64 + POLES) / (n as f64 - 1.0 + 2.0 * POLES);
         let turn = TAU * (i as f64 / golden).fract();
-        let across = (1.0 - z * z).max(0.0).sqrt();
-        let unit = DVec3::new(across * libm::cos(turn), across * libm::sin(turn), z);
-        WorldBox::around(unit * radius, DVec3::ONE)
+        WorldBox::around(on_sphere(z, turn) * radius, DVec3::ONE)
     });
     Ok(boxes.collect())
 }

@@ -33,7 +33,6 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use crate::arithmetic::rounding::{sum_down, sum_up};
 use crate::arithmetic::two_sum;
 
 use crate::geometry::{Aabb, PlaneTree};
@@ -54,10 +53,11 @@ pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 #[cfg(feature = "cli")]
 pub(crate) use memory::available_bytes;
+pub(crate) use meshes::ground::Shape;
 pub use obj::read_obj;
 pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_AXES, UpAxis};
 pub use rng::SeededRng;
-pub(crate) use rng::mix64;
+pub(crate) use rng::{mix64, on_sphere};
 pub use rooms::{Portal, Tiling};
 pub use samples::{FETCHED, Fetched, NOTICE, SAMPLES, Sample};
 pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
@@ -122,9 +122,9 @@ impl WorldBox {
 
     /// The largest box within one about an origin; empty where there is none.
     pub fn within(b: &Aabb, origin: DVec3) -> Self {
-        let low = |k: usize| sum_up(origin[k], b.min[k].into());
-        let high = |k: usize| sum_down(origin[k], b.max[k].into());
-        WorldBox::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
+        // Outward, of what is inside out.
+        let (max, min) = Aabb::new(b.max, b.min).in_world(origin);
+        WorldBox::new(min, max)
     }
 
     /// The box standing on `base` (centre of its bottom face).

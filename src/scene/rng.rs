@@ -50,6 +50,12 @@ impl SeededRng {
     }
 }
 
+/// The point of the unit sphere at a height, turned about the axis of z.
+pub fn on_sphere(z: f64, turn: f64) -> DVec3 {
+    let radius = (1.0 - z * z).sqrt();
+    DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z)
+}
+
 /// A hash of a number: a step of SplitMix64 (Steele et al. 2014).
 pub fn mix64(key: u64) -> u64 {
     let mut z = key.wrapping_add(0x9E37_79B9_7F4A_7C15);

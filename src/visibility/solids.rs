@@ -7,7 +7,6 @@
 
 use glam::DVec3;
 
-use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
 use crate::scene::{Scene, WorldBox};
 
@@ -28,7 +27,9 @@ impl Solids {
     /// Boxes of all items of a scene, for any shape of the items. O(n).
     pub fn of(scene: &Scene) -> Solids {
         let boxes: Vec<WorldBox> = scene.written().collect();
-        let inner = boxes.iter().map(|b| rounded_inward(b, scene.origin));
+        // Outward, of what is inside out.
+        let turned = |b: &WorldBox| Aabb::rounded_outward(b.max, b.min, scene.origin);
+        let inner = boxes.iter().map(turned).map(|b| Aabb::new(b.max, b.min));
         Solids {
             inner: inner.collect(),
             boxes,
@@ -36,14 +37,6 @@ impl Solids {
             origin: scene.origin,
         }
     }
-}
-
-/// The largest f32 box about an origin that lies within the f64 one; empty if
-/// there is none.
-fn rounded_inward(b: &WorldBox, origin: DVec3) -> Aabb {
-    let low = |axis: usize| difference_up(b.min[axis], origin[axis]);
-    let high = |axis: usize| difference_down(b.max[axis], origin[axis]);
-    Aabb::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
 }
 
 #[cfg(test)]
