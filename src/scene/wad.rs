@@ -68,85 +68,86 @@ impl WadMap {
     /// The first thing that is wrong, by its byte.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap> {
         let wad = Wad::open(bytes, file)?;
-        let of = wad.tables(map)?;
+        let [things, linedefs, sides, vertices, rest @ ..] = wad.tables(map)?;
+        let [segs, leaves, nodes, sectors, reject] = rest;
         let vertex = |table: &Table, i: usize, at: usize| -> Result<[i32; 2]> {
-            let v = table.index16(i, at, &of.vertices)?;
-            Ok([0, 2].map(|at| of.vertices.short(v, at) as i32))
+            let v = table.index16(i, at, &vertices)?;
+            Ok([0, 2].map(|at| vertices.short(v, at) as i32))
         };
         // The sector on a side of a line (0 right, 1 left), if there is one.
         let sector_of = |line: usize, side: usize| -> Result<Option<u32>> {
             let at = 10 + 2 * side;
-            if of.lines.word(line, at) == u16::MAX {
+            if linedefs.word(line, at) == u16::MAX {
                 return Ok(None);
             }
-            let side = of.lines.index16(line, at, &of.sides)?;
-            Ok(Some(of.sides.index16(side, 28, &of.sectors)? as u32))
+            let side = linedefs.index16(line, at, &sides)?;
+            Ok(Some(sides.index16(side, 28, &sectors)? as u32))
         };
         let linedef = |i: usize| -> Result<Linedef> {
             let sectors = [sector_of(i, 0)?, sector_of(i, 1)?];
             if sectors == [None; 2] {
                 let found = "a linedef without a side";
-                return Err(of.lines.error(i, 10, found, "at least one side"));
+                return Err(linedefs.error(i, 10, found, "at least one side"));
             }
             Ok(Linedef {
-                ends: [vertex(&of.lines, i, 0)?, vertex(&of.lines, i, 2)?],
-                action: of.lines.word(i, 6),
-                tag: of.lines.word(i, 8),
+                ends: [vertex(&linedefs, i, 0)?, vertex(&linedefs, i, 2)?],
+                action: linedefs.word(i, 6),
+                tag: linedefs.word(i, 8),
                 sectors,
             })
         };
-        let lines = (0..of.lines.len()).map(linedef);
+        let lines = (0..linedefs.len()).map(linedef);
         let lines = lines.collect::<Result<Vec<_>, _>>()?;
-        for i in 0..of.segs.len() {
-            vertex(&of.segs, i, 0)?;
-            vertex(&of.segs, i, 2)?;
-            of.segs.index16(i, 6, &of.lines)?;
+        for i in 0..segs.len() {
+            vertex(&segs, i, 0)?;
+            vertex(&segs, i, 2)?;
+            segs.index16(i, 6, &linedefs)?;
         }
         let leaf_sector = |i: usize| -> Result<u32> {
-            let (count, first) = (of.leaves.word(i, 0), of.leaves.index16(i, 2, &of.segs)?);
-            if count == 0 || first + usize::from(count) > of.segs.len() {
+            let (count, first) = (leaves.word(i, 0), leaves.index16(i, 2, &segs)?);
+            if count == 0 || first + usize::from(count) > segs.len() {
                 let found = format!("a subsector of {count} segs from {first} on");
-                let expected = format!("at least one, of {}", of.segs.len());
-                return Err(of.leaves.error(i, 0, found, expected));
+                let expected = format!("at least one, of {}", segs.len());
+                return Err(leaves.error(i, 0, found, expected));
             }
-            let line = of.segs.index16(first, 6, &of.lines)?;
-            let side = usize::from(of.segs.word(first, 8) != 0);
+            let line = segs.index16(first, 6, &linedefs)?;
+            let side = usize::from(segs.word(first, 8) != 0);
             lines[line].sectors[side].ok_or_else(|| {
                 let found = format!("a seg on the missing side of linedef {line}");
-                of.segs.error(first, 8, found, "a side that exists")
+                segs.error(first, 8, found, "a side that exists")
             })
         };
-        let leaf_sectors = (0..of.leaves.len()).map(leaf_sector);
+        let leaf_sectors = (0..leaves.len()).map(leaf_sector);
         let child = |word: u16| match u32::from(word & 0x7FFF) {
             node if word & 0x8000 == 0 => BspChild::Node(node),
             leaf => BspChild::Leaf(leaf),
         };
-        let nodes = (0..of.nodes.len()).map(|i| BspNode {
-            start: of.nodes.point(i, 0),
-            direction: of.nodes.point(i, 4),
-            children: [24, 26].map(|at| child(of.nodes.word(i, at))),
+        let split = (0..nodes.len()).map(|i| BspNode {
+            start: nodes.point(i, 0),
+            direction: nodes.point(i, 4),
+            children: [24, 26].map(|at| child(nodes.word(i, at))),
         });
         // The root is the last node; a map of one leaf has none.
-        let root = match of.nodes.len() {
+        let root = match nodes.len() {
             0 => BspChild::Leaf(0),
             count => BspChild::Node(count as u32 - 1),
         };
-        let things = (0..of.things.len()).map(|i| Thing {
-            at: of.things.point(i, 0),
-            angle_deg: of.things.short(i, 4),
-            kind: of.things.word(i, 6),
+        let things = (0..things.len()).map(|i| Thing {
+            at: things.point(i, 0),
+            angle_deg: things.short(i, 4),
+            kind: things.word(i, 6),
         });
-        let sectors = (0..of.sectors.len()).map(|i| SectorRecord {
-            heights: [0, 2].map(|at| of.sectors.short(i, at)),
-            tag: of.sectors.word(i, 24),
+        let sectors = (0..sectors.len()).map(|i| SectorRecord {
+            heights: [0, 2].map(|at| sectors.short(i, at)),
+            tag: sectors.word(i, 24),
         });
         Ok(WadMap {
             leaf_sectors: leaf_sectors.collect::<Result<_, _>>()?,
-            tree: BspTree::new(nodes.collect(), root, of.leaves.len(), EXTENT)
-                .map_err(|found| of.nodes.error(0, 0, found, "a BSP tree"))?,
+            tree: BspTree::new(split.collect(), root, leaves.len(), EXTENT)
+                .map_err(|found| nodes.error(0, 0, found, "a BSP tree"))?,
             things: things.collect(),
             sectors: sectors.collect(),
-            reject: of.reject.to_vec(),
+            reject: reject.data.to_vec(),
             disputes: OnceLock::new(),
             lines,
         })

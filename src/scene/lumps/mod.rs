@@ -50,20 +50,6 @@ struct Lump {
     entry: usize,
 }
 
-/// The tables of one map.
-pub struct MapTables<'a> {
-    pub things: Table<'a>,
-    pub lines: Table<'a>,
-    pub sides: Table<'a>,
-    pub vertices: Table<'a>,
-    pub segs: Table<'a>,
-    pub leaves: Table<'a>,
-    pub nodes: Table<'a>,
-    pub sectors: Table<'a>,
-    /// Empty if the map has none.
-    pub reject: &'a [u8],
-}
-
 impl<'a> Wad<'a> {
     /// Reads the directory. The place of a lump is checked when the lump is read:
     /// damage in another does not concern a map.
@@ -139,11 +125,12 @@ impl<'a> Wad<'a> {
         })
     }
 
-    /// The tables of the named map, or of the only one.
+    /// The tables of the named map, or of the only one, from THINGS to REJECT.
     ///
+    /// REJECT is empty if the map has none.
     /// A map's lumps are found by name behind its marker, up to the next marker or to
     /// the first that the order of a map's lumps does not allow; others are passed over.
-    pub fn tables(&self, map: Option<&str>) -> Result<MapTables<'_>> {
+    pub fn tables(&self, map: Option<&str>) -> Result<[Table<'_>; 9]> {
         let (name, marker) = self.marker(map)?;
         let mut last = None;
         let is_own = |&at: &usize| {
@@ -194,17 +181,17 @@ impl<'a> Wad<'a> {
             let found = format!("map {name} {which} (no {})", empty.name);
             return Err(self.error(empty.start, found, OWN_NODES));
         }
-        Ok(MapTables {
-            things: table("THINGS", 10)?,
-            lines: table("LINEDEFS", 14)?,
-            sides: table("SIDEDEFS", 30)?,
-            vertices: table("VERTEXES", 4)?,
+        Ok([
+            table("THINGS", 10)?,
+            table("LINEDEFS", 14)?,
+            table("SIDEDEFS", 30)?,
+            table("VERTEXES", 4)?,
             segs,
             leaves,
             nodes,
-            sectors: table("SECTORS", 26)?,
-            reject: table("REJECT", 1)?.data,
-        })
+            table("SECTORS", 26)?,
+            table("REJECT", 1)?,
+        ])
     }
 
     fn error(&self, offset: usize, found: impl Display, expected: impl Display) -> InputError {

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::super::graph::RegionId;
 use super::DoomMap;
-use crate::scene::{Dispute, Linedef, Scene, SurfaceKind, Surfaces};
+use crate::scene::{Dispute, Linedef, Scene, Shape, SurfaceKind, Surfaces};
 
 /// The triangles of a scene's items, if they are no solid boxes.
 ///
@@ -72,7 +72,15 @@ impl DoomMap {
         for sector in 0..self.sectors.len() as RegionId {
             let mut shape = Shape::default();
             if self.moves(sector) {
-                self.walls_about(sector, &mut shape);
+                // As far as they hide however it moves.
+                for line in &self.lines {
+                    let moving = line.sectors.iter().flatten().filter(|&&s| self.moves(s));
+                    // Those between two such sectors belong to the lower number.
+                    if moving.min() == Some(&sector) {
+                        let open = |of: RegionId| self.sectors[of as usize];
+                        parts(line, open).for_each(|part| shape.wall(line, part));
+                    }
+                }
             } else {
                 let [floor, ceiling] = heights(sector);
                 for corners in self.triangles(sector).unwrap_or_default() {
@@ -127,18 +135,6 @@ impl DoomMap {
         let ends: Vec<Point> = edges.iter().map(|[from, _]| *from).collect();
         edges.iter().flat_map(|edge| parted(*edge, &ends)).collect()
     }
-
-    /// The walls of linedefs about a sector that moves, as far as they hide however it
-    /// does; those between two such sectors belong to the lower number.
-    fn walls_about(&self, sector: RegionId, shape: &mut Shape) {
-        let open = |of: RegionId| self.sectors[of as usize];
-        for line in &self.lines {
-            let moving = line.sectors.iter().flatten().filter(|&&s| self.moves(s));
-            if moving.min() == Some(&sector) {
-                parts(line, open).for_each(|part| shape.wall(line, part));
-            }
-        }
-    }
 }
 
 /// The parts of a linedef's wall between sectors of these heights.
@@ -163,12 +159,6 @@ fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterato
 /// The triangles of an item in the making, map coordinates.
 ///
 /// Whole numbers of 17 bits, exact in f32.
-#[derive(Default)]
-struct Shape {
-    points: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-}
-
 impl Shape {
     fn point(&mut self, [x, y]: [i32; 2], z: f64) -> u32 {
         self.points.push(Vec3::new(x as f32, y as f32, z as f32));
