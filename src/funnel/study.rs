@@ -174,7 +174,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     let Setting { scene, path, .. } = input.setting;
     fits(input.samples, available_bytes())?;
     let world = World::new(input, begin)?;
-    let mut warnings = path.warnings(scene);
+    let mut warnings = crate::path::warnings(scene, &path.name, &path.cameras);
     let rounded = world.rounded();
     rounded.iter().for_each(|text| warn(text));
     warnings.extend(rounded);

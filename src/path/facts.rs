@@ -52,7 +52,12 @@ pub struct MatrixFacts {
 impl CameraFacts {
     /// Facts of the cameras of a path, in a scene with an up axis.
     pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
-        let lenses: Vec<Lens> = cameras.iter().map(plain_lens).collect();
+        // Of a matrix without a lens the matrix itself.
+        let lenses = cameras.iter().map(|camera| {
+            let found = camera.lens.matrix().and_then(|m| m.unprojected().ok());
+            found.map_or(camera.lens, |found| found.camera.lens)
+        });
+        let lenses: Vec<Lens> = lenses.collect();
         let all = |of: &dyn Fn(&Lens) -> Option<f64>| range(lenses.iter().filter_map(of));
         let fars = all(&|lens| Some(lens.far().unwrap_or(f64::INFINITY)));
         CameraFacts {
@@ -123,12 +128,6 @@ fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
     range.map_or([None; 2], |range| range.map(finite))
 }
 
-/// Lens of a camera; that of a matrix without one stays the matrix.
-fn plain_lens(camera: &Camera) -> Lens {
-    let found = camera.lens.matrix().and_then(|m| m.unprojected().ok());
-    found.map_or(camera.lens, |found| found.camera.lens)
-}
-
 fn fovy_deg(lens: &Lens) -> Option<f64> {
     match *lens.kind() {
         LensKind::Perspective { fovy_deg, .. } => Some(fovy_deg),
@@ -177,25 +176,17 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     found.map(|doubt| format!("{path}: {doubt}")).collect()
 }
 
-impl CameraPath {
-    /// [`warnings`] about these cameras in a scene.
-    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        warnings(scene, &self.name, &self.cameras)
-    }
-}
-
 impl LensDefaults {
     /// Tells of what is given and has no effect on the cameras of a path.
     pub(super) fn note_unused(&self, path: &CameraPath) {
         let names = ["--fovy", "--aspect", "--near", "--far"];
-        let endless = |far: Option<f64>| Some(far.unwrap_or(f64::INFINITY));
+        let endless = |far: Option<f64>| far.unwrap_or(f64::INFINITY);
         let of = |lens: &Lens| {
-            let depths = [Some(lens.near()), endless(lens.far())];
+            let depths = [lens.near(), endless(lens.far())].map(Some);
             [fovy_deg(lens), aspect(lens), depths[0], depths[1]]
         };
-        let endless_far = |far: Option<f64>| endless(far.filter(|far| *far <= FARTHEST));
-        let far = self.far.and_then(endless_far);
-        let given = [self.fovy_deg, self.aspect, self.near, far];
+        let far = self.far.map(|far| far.filter(|far| *far <= FARTHEST));
+        let given = [self.fovy_deg, self.aspect, self.near, far.map(endless)];
         let has = |is: &dyn Fn(&Lens) -> bool| path.cameras.iter().any(|camera| is(&camera.lens));
         let is_unused =
             |at: &usize| given[*at].is_some() && !has(&|lens| of(lens)[*at] == given[*at]);
@@ -242,7 +233,12 @@ fn mirrored(_: &Scene, cameras: &[Camera]) -> Option<String> {
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
 fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let ups = cameras.iter().filter_map(|c| rolled_up(scene.up, c));
+    let ups = cameras.iter().filter_map(|c| {
+        let ([across, along], image_up) = upward(scene.up, c)?;
+        // Straight up or down there is no roll.
+        let is_level = across.hypot(along) > 0.1;
+        (is_level && along < across.abs()).then_some(image_up)
+    });
     let ups: Vec<DVec3> = ups.collect();
     let (first, own) = (ups.first()?, scene.up.name());
     let what = share(ups.len(), cameras);
@@ -270,14 +266,6 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
             first.x, first.y, first.z, scene.name
         ),
     })
-}
-
-/// Up in the image of a camera that is rolled.
-fn rolled_up(up: UpAxis, camera: &Camera) -> Option<DVec3> {
-    let ([across, along], image_up) = upward(up, camera)?;
-    // Straight up or down there is no roll.
-    let is_level = across.hypot(along) > 0.1;
-    (is_level && along < across.abs()).then_some(image_up)
 }
 
 /// Parts of an axis along right and up in the image, and the vector up there.

@@ -259,7 +259,8 @@ pub fn load_scaled(
     scale: Option<f64>,
 ) -> Result<CameraPath> {
     let path = read(source, scene, defaults, scale)?;
-    path.warnings(scene).iter().for_each(|text| warn(text));
+    let doubts = warnings(scene, &path.name, &path.cameras);
+    doubts.iter().for_each(|text| warn(text));
     defaults.note_unused(&path);
     Ok(path)
 }

@@ -225,7 +225,7 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     }
     tasks.extend(twin);
     let plan = StudyPlan::new(tasks, cameras, &setting.protocol);
-    let mut warnings = path.warnings(scene);
+    let mut warnings = crate::path::warnings(scene, &path.name, &path.cameras);
     let left_out = |name| format!("left out: {name} refuses these items");
     warnings.extend(built.refused.iter().map(left_out));
     Ok(Prepared {

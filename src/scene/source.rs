@@ -123,7 +123,16 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
         spec.finish()?;
         return sample.load();
     }
-    Err(unknown_scene(spec.name()).into())
+    let generated = FAMILIES.iter().chain(MESHES).map(|f| f.name);
+    let known = generated.chain(SAMPLES.iter().map(|s| s.name));
+    let guess = nearest(spec.name(), known.clone());
+    let hint = guess.map_or(String::new(), |guess| format!("; did you mean '{guess}'?"));
+    let error = SpecError::new(format_args!(
+        "unknown scene '{}': neither a file nor a built-in scene{hint} (built in: {})",
+        spec.name(),
+        known.collect::<Vec<_>>().join(", ")
+    ));
+    Err(error.into())
 }
 
 /// Refuses a scene whose name says that it will not fit into memory; nothing is
@@ -239,17 +248,6 @@ fn read_beside(
 /// Tests for the magic of a WAD file.
 pub fn is_wad(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD")
-}
-
-fn unknown_scene(word: &str) -> SpecError {
-    let generated = FAMILIES.iter().chain(MESHES).map(|f| f.name);
-    let known = generated.chain(SAMPLES.iter().map(|s| s.name));
-    let guess = nearest(word, known.clone());
-    let hint = guess.map_or(String::new(), |guess| format!("; did you mean '{guess}'?"));
-    SpecError::new(format_args!(
-        "unknown scene '{word}': neither a file nor a built-in scene{hint} (built in: {})",
-        known.collect::<Vec<_>>().join(", ")
-    ))
 }
 
 impl Sample {

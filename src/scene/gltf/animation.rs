@@ -211,7 +211,7 @@ impl File<'_> {
         let (interpolation, each) = match sampler.interpolation {
             Checked::Valid(Interpolation::CubicSpline) => (Interpolation::CubicSpline, 3),
             Checked::Valid(other) => (other, 1),
-            _ => return Err(self.error(place.to_owned(), "an unknown interpolation", "LINEAR")),
+            _ => return Err(self.error(place, "an unknown interpolation", "LINEAR")),
         };
         let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
         if !ascend || times.is_empty() || each * times.len() != values.len() {
@@ -221,7 +221,7 @@ impl File<'_> {
                 false => "times that do not ascend".to_owned(),
             };
             let expected = format!("ascending times with {} each", counted(each, "value"));
-            return Err(self.error(place.to_owned(), found, &expected));
+            return Err(self.error(place, found, &expected));
         }
         Ok(Track {
             times,

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fmt;
+use std::fmt::Display;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -204,8 +204,8 @@ impl<'f> File<'f> {
         beside(&decoded(uri))
     }
 
-    pub fn error(&self, place: String, found: impl fmt::Display, expected: &str) -> InputError {
-        InputError::at(self.name, &place, found, expected)
+    pub fn error(&self, place: impl Display, found: impl Display, expected: &str) -> InputError {
+        InputError::at(self.name, place, found, expected)
     }
 
     pub fn get<'s, T>(&self, all: &'s [T], index: Index<T>, place: &str) -> Result<&'s T> {
@@ -215,14 +215,14 @@ impl<'f> File<'f> {
                 0 => "no index, as there is nothing to name".to_owned(),
                 count => format!("an index below {count}"),
             };
-            self.error(place.to_owned(), format!("index {index}"), &expected)
+            self.error(place, format!("index {index}"), &expected)
         })
     }
 
     /// Vectors of an accessor, `width` numbers each.
     pub fn vectors(&self, index: Index<Accessor>, width: usize, place: &str) -> Result<Vec<DVec4>> {
         let values = self.values(index, width, place)?;
-        let values = values.map_err(|why| self.error(place.to_owned(), why, "plain accessors"))?;
+        let values = values.map_err(|why| self.error(place, why, "plain accessors"))?;
         let vector = |numbers: &[f64]| {
             let mut vector = [0.0; 4];
             vector[..width].copy_from_slice(numbers);

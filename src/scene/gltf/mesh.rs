@@ -169,7 +169,7 @@ impl File<'_> {
             }
             Checked::Valid(_) => return Ok(Err("has points or lines".to_owned())),
             Checked::Invalid => {
-                return Err(self.error(place.to_owned(), "an unknown mode", "a mode of 0 to 6"));
+                return Err(self.error(place, "an unknown mode", "a mode of 0 to 6"));
             }
         };
         Ok(Ok(Triangles {

@@ -245,7 +245,7 @@ impl File<'_> {
         options.check_fits(name, None, triangles.max(points))?;
         if triangles.max(points) > u64::from(u32::MAX) / 4 {
             let found = format!("{triangles} triangles");
-            return Err(self.error("meshes".to_owned(), found, "at most a billion"));
+            return Err(self.error("meshes", found, "at most a billion"));
         }
         let world = |item: &Placed| -> Vec<DVec3> {
             let points = plain(item).points.iter();

@@ -50,40 +50,26 @@ const RADIUS: f64 = 1.0;
 pub fn statue(triangles: usize, seed: u64) -> Surfaces {
     let frequency = libm::sqrt(triangles as f64 / 20.0) as u32;
     let (directions, faces) = icosphere(frequency);
-    let shape = Body::new(seed);
-    let stretched = |d: &DVec3| (d * DVec3::new(1.0, 1.0, TALL) * shape.radius(*d)).as_vec3();
+    let mut rng = SeededRng::new(seed);
+    // Direction, height and sharpness of each.
+    let lobes = [(); LOBES].map(|()| {
+        let direction = rng.normal3().normalize_or(DVec3::Z);
+        (direction, rng.between(-0.3, 0.6), rng.between(4.0, 30.0))
+    });
+    // Between 0.2 and some units.
+    let radius = |d: DVec3| {
+        let bulge = |(at, height, sharp): &(DVec3, f64, f64)| {
+            height * libm::exp(-sharp * (1.0 - at.dot(d)))
+        };
+        let large: f64 = lobes.iter().map(bulge).sum();
+        let small = fractal(d * 6.0, 5, seed) - 0.5;
+        (RADIUS * (1.0 + large + 0.15 * small)).max(0.2)
+    };
+    let stretched = |d: &DVec3| (d * DVec3::new(1.0, 1.0, TALL) * radius(*d)).as_vec3();
     let points: Vec<Vec3> = directions.iter().map(stretched).collect();
     let mut surfaces = Surfaces::about(DVec3::ZERO);
     surfaces.push(SurfaceKind::Opaque, false, &points, &faces);
     surfaces
-}
-
-struct Body {
-    seed: u64,
-    /// Direction, height and sharpness of each.
-    lobes: Vec<(DVec3, f64, f64)>,
-}
-
-impl Body {
-    fn new(seed: u64) -> Body {
-        let mut rng = SeededRng::new(seed);
-        let lobes = (0..LOBES).map(|_| {
-            let direction = rng.normal3().normalize_or(DVec3::Z);
-            (direction, rng.between(-0.3, 0.6), rng.between(4.0, 30.0))
-        });
-        let lobes = lobes.collect();
-        Body { seed, lobes }
-    }
-
-    /// Between 0.2 and some units.
-    fn radius(&self, d: DVec3) -> f64 {
-        let bulge = |(at, height, sharp): &(DVec3, f64, f64)| {
-            height * libm::exp(-sharp * (1.0 - at.dot(d)))
-        };
-        let large: f64 = self.lobes.iter().map(bulge).sum();
-        let small = fractal(d * 6.0, 5, self.seed) - 0.5;
-        (RADIUS * (1.0 + large + 0.15 * small)).max(0.2)
-    }
 }
 
 /// Golden ratio.
@@ -109,16 +95,29 @@ const FACES: [usize; 60] = [
 /// points for a frequency f >= 1.
 pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let f = frequency.max(1);
-    let mut sphere = Sphere {
-        frequency: f,
-        ids: HashMap::new(),
-        points: Vec::new(),
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    // Point of each set of corners with their weights, without those of weight zero.
+    let mut ids: HashMap<[(usize, u32); 3], u32> = HashMap::new();
+    let mut point = |face: [usize; 3], weights: [u32; 3]| {
+        let mut key = [0, 1, 2].map(|k| match weights[k] {
+            0 => (usize::MAX, 0),
+            weight => (face[k], weight),
+        });
+        // The same sum in the same order, whichever face asks.
+        key.sort_unstable();
+        *ids.entry(key).or_insert_with(|| {
+            let parts = key.iter().filter(|(_, weight)| *weight > 0);
+            let sum = parts.fold(DVec3::ZERO, |sum, &(corner, weight)| {
+                sum + vertex(corner) * (f64::from(weight) / f64::from(f))
+            });
+            points.push(sum.normalize());
+            points.len() as u32 - 1
+        })
     };
-    let mut triangles = Vec::new();
     for &face in FACES.as_chunks().0 {
         for j in 0..f {
             for i in 0..f - j {
-                let mut at = |i: u32, j: u32| sphere.point(face, [f - i - j, i, j]);
+                let mut at = |i: u32, j: u32| point(face, [f - i - j, i, j]);
                 let (a, b, c) = (at(i, j), at(i + 1, j), at(i, j + 1));
                 triangles.push([a, b, c]);
                 if i + j + 1 < f {
@@ -127,34 +126,7 @@ pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
             }
         }
     }
-    (sphere.points, triangles)
-}
-
-struct Sphere {
-    frequency: u32,
-    /// Point of each set of corners with their weights, without those of weight zero.
-    ids: HashMap<[(usize, u32); 3], u32>,
-    points: Vec<DVec3>,
-}
-
-impl Sphere {
-    fn point(&mut self, face: [usize; 3], weights: [u32; 3]) -> u32 {
-        let mut key = [0, 1, 2].map(|k| match weights[k] {
-            0 => (usize::MAX, 0),
-            weight => (face[k], weight),
-        });
-        // The same sum in the same order, whichever face asks.
-        key.sort_unstable();
-        let (next, frequency) = (self.points.len() as u32, f64::from(self.frequency));
-        *self.ids.entry(key).or_insert_with(|| {
-            let parts = key.iter().filter(|(_, weight)| *weight > 0);
-            let sum = parts.fold(DVec3::ZERO, |sum, &(corner, weight)| {
-                sum + vertex(corner) * (f64::from(weight) / frequency)
-            });
-            self.points.push(sum.normalize());
-            next
-        })
-    }
+    (points, triangles)
 }
 
 #[cfg(test)]

@@ -64,11 +64,12 @@ impl Ground {
         let begun = Instant::now();
         let up = scene.up;
         let of_item = |item| surfaces.of(item).map(|t| t.map(|p| up.to_z_up(p) + 0.0));
+        let flat = |corners: [Vec3; 3]| corners.map(|p| [p.x, p.y]);
         let items = (0..surfaces.items()).filter(|&item| {
             let mut kinds = surfaces.kinds[surfaces.range(item)].iter();
             kinds.all(|&kind| kind == SurfaceKind::Opaque)
                 && !surfaces.of_item[item].is_empty()
-                && of_item(item).all(faces_up)
+                && of_item(item).map(flat).all(|[a, b, c]| turn(a, b, c) > 0)
         });
         let items: Vec<usize> = items.collect();
         let triangles: Vec<[Vec3; 3]> = items.iter().flat_map(|&item| of_item(item)).collect();
@@ -132,12 +133,6 @@ impl Ground {
         });
         is_over && below.all(|t| t.iter().all(|p| f64::from(p.z) < low.z))
     }
-}
-
-/// Returns `true` if a triangle faces up.
-fn faces_up(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| [p.x, p.y]);
-    turn(a, b, c) > 0
 }
 
 /// The bounds of triangles that all face up, if they are a height over a rectangle.

@@ -41,7 +41,7 @@ const SLACK: f64 = 10.0 / (1u64 << 24) as f64;
 /// each): some units of 2^-50.
 const COSINE: f64 = 64.0 / (1u64 << 53) as f64;
 /// Coordinate above which products of three numbers may overflow.
-const FAR: f32 = (1u64 << 59) as f32;
+pub const FAR: f32 = (1u64 << 59) as f32;
 /// Least margin in world units.
 const LEAST_MARGIN: f64 = 1.0 / (1u64 << 40) as f64;
 /// Steps in which the axis is found.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::clusters::Clusters;
-use super::cones::dot;
+use super::cones::{FAR, dot};
 use super::exact::{Eye, normal};
 use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
@@ -21,8 +21,6 @@ use crate::query::Bits;
 
 /// Error per unit of the way: see above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
-/// Coordinate above which sums may overflow.
-const FAR: f32 = (1u64 << 59) as f32;
 /// For what underflows.
 const LEAST: f64 = 1e-30;
 
