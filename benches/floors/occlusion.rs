@@ -151,7 +151,7 @@ fn missed_by(kernel: Kernel, only_test: bool, turns: usize) -> u32 {
 
     let counts = |count: &dyn Fn(&MaskedInner, &Asked) -> u32| -> Vec<u32> {
         let of_view = |(_, culling, asked): &(_, Interleaved<MaskedInner>, Vec<_>)| {
-            count(culling.buffer(), asked)
+            count(&culling.buffer, asked)
         };
         views.iter().map(of_view).collect()
     };

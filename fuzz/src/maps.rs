@@ -41,7 +41,7 @@ pub fn ibsp(bytes: &[u8]) {
         }
     }
     if graph.len() <= MOST {
-        assert!(Pvs::of_quake(map).is_none_or(|pvs| pvs.len() == graph.len()));
+        assert!(Pvs::of_quake(map).is_none_or(|pvs| pvs.rows.len() == graph.len()));
         see_through(graph, &scene.places);
     }
 }

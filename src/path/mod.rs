@@ -17,7 +17,7 @@ use glam::DVec3;
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
 use crate::input::{InputError, Result, names_file, read_file, warn};
-use crate::scene::{self, PlaceView, Scene, SeededRng, UpAxis, WorldBox, memory};
+use crate::scene::{self, PlaceView, Scene, SeededRng, WorldBox, memory};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -291,15 +291,13 @@ fn read(
     };
     fits(source, stage.count as u64)?;
     let poses = (family.frames)(&stage, &mut spec)?;
-    let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
-    spec.finish()?;
-    let cameras = optics.cameras(source, scene.up, &poses)?;
+    let (cameras, visible) = cameras_at(source, &mut spec, defaults, &stage, &poses)?;
     let path = CameraPath {
         name: source.to_owned(),
         cameras,
         ..CameraPath::default()
     };
-    match optics.visible {
+    match visible {
         Some(share) => path.seeing(scene, share, scale),
         None => Ok(path),
     }
@@ -313,107 +311,90 @@ fn fits(source: &str, cameras: u64) -> Result<()> {
     memory::check_fits(&label, cameras.saturating_mul(PER_CAMERA), 0, cameras)
 }
 
-/// The lens parameters of a generated path.
-struct Optics {
-    fovy_deg: f64,
-    aspect: f64,
-    near: f64,
-    far: Option<f64>,
-    visible: Option<f64>,
-    /// True where the path's own parameters state fovy, aspect, near and far.
-    named: [bool; 4],
-}
-
-impl Optics {
-    fn from_spec(
-        spec: &mut Spec,
-        defaults: &LensDefaults,
-        stage: &Stage,
-        poses: &[Pose],
-    ) -> Result<Optics, SpecError> {
-        // From the farthest eye everything up to the far side is in reach.
-        let farthest = poses.iter().map(|p| (p.eye - stage.centre()).length());
-        let natural = farthest.fold(0.0, f64::max) + stage.radius();
-        let visible = spec.text("visible");
-        let far = match (spec.text("far").as_deref(), &visible) {
-            (Some(far), Some(visible)) => {
-                let found =
-                    format_args!("far={far} beside visible={visible}; expected one of them");
-                return Err(SpecError::new(found));
-            }
-            (Some("inf"), _) => None,
-            (Some(_), _) => Some(spec.number("far", natural)?),
-            (None, None) => defaults.far.unwrap_or(Some(natural)),
-            (None, Some(_)) => Some(natural),
-        };
-        let far = far.filter(|far| *far <= FARTHEST);
-        let near = match spec.text("near") {
-            Some(_) => Some(spec.number("near", 0.0)?),
-            // Items may be an arm's length away from an eye among them.
-            None if spec.name() == "street" => defaults.near.or(Some(0.1)),
-            None => defaults.near,
-        };
-        // A near plane that follows from it would be named in its place.
-        if let Some(far) = far.filter(|far| near.is_none() && far / 1000.0 <= 0.0) {
-            return Err(SpecError::new(format_args!(
-                "in '{}': far is {far:?}; expected a number above 0 (or inf)",
-                spec.name()
-            )));
+/// Cameras at poses with the lens of a spec, and the share of items to be visible.
+fn cameras_at(
+    path: &str,
+    spec: &mut Spec,
+    defaults: &LensDefaults,
+    stage: &Stage,
+    poses: &[Pose],
+) -> Result<(Vec<Camera>, Option<f64>)> {
+    // From the farthest eye everything up to the far side is in reach.
+    let farthest = poses.iter().map(|p| (p.eye - stage.centre()).length());
+    let natural = farthest.fold(0.0, f64::max) + stage.radius();
+    let visible = spec.text("visible");
+    let far = match (spec.text("far").as_deref(), &visible) {
+        (Some(far), Some(visible)) => {
+            let found = format_args!("far={far} beside visible={visible}; expected one of them");
+            return Err(SpecError::new(found).into());
         }
-        let named = ["fovy", "aspect", "near", "far"].map(|name| spec.text(name).is_some());
-        let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
-        let [fovy_deg, aspect] = defaults.shape();
-        Ok(Optics {
-            fovy_deg: spec.number("fovy", fovy_deg)?,
-            aspect: spec.number("aspect", aspect)?,
-            near: near.unwrap_or(far.unwrap_or(natural) / 1000.0),
-            far,
-            visible: visible.transpose()?,
-            named,
-        })
+        (Some("inf"), _) => None,
+        (Some(_), _) => Some(spec.number("far", natural)?),
+        (None, None) => defaults.far.unwrap_or(Some(natural)),
+        (None, Some(_)) => Some(natural),
+    };
+    let far = far.filter(|far| *far <= FARTHEST);
+    let near = match spec.text("near") {
+        Some(_) => Some(spec.number("near", 0.0)?),
+        // Items may be an arm's length away from an eye among them.
+        None if spec.name() == "street" => defaults.near.or(Some(0.1)),
+        None => defaults.near,
+    };
+    // A near plane that follows from it would be named in its place.
+    if let Some(far) = far.filter(|far| near.is_none() && far / 1000.0 <= 0.0) {
+        return Err(SpecError::new(format_args!(
+            "in '{}': far is {far:?}; expected a number above 0 (or inf)",
+            spec.name()
+        ))
+        .into());
     }
-
-    fn cameras(&self, path: &str, up: UpAxis, poses: &[Pose]) -> Result<Vec<Camera>> {
-        let camera = |pose: &Pose| -> Result<Camera, CameraError> {
-            let own = pose.view.map(|view| view.up);
-            let upward = own.unwrap_or_else(|| up_for(pose.forward));
-            let axes = [pose.eye, pose.forward, upward];
-            let [eye, forward, upward] = axes.map(|v| up.from_z_up(v));
-            let frame = Frame::looking_along(eye, forward, upward)?;
-            let lens = self.lens(pose.view)?;
-            let mut camera = Camera { frame, lens };
-            if pose.magnification != 1.0 {
-                camera.zoom(pose.magnification)?;
-            }
-            Ok(camera)
-        };
-        let numbered = poses.iter().enumerate().map(|(index, pose)| {
-            camera(pose).map_err(|error| {
-                InputError::new(format_args!("path '{path}', camera {index}: {error}"))
-            })
-        });
-        numbered.collect()
-    }
-
-    /// The lens of a place, where no parameters replace it.
-    ///
-    /// A share of items replaces far.
-    fn lens(&self, own: Option<PlaceView>) -> Result<Lens, CameraError> {
+    let names = ["fovy", "aspect", "near", "far"];
+    let [has_fovy, has_aspect, has_near, has_far] = names.map(|name| spec.text(name).is_some());
+    let visible = visible.map(|text| visible_share(spec, &text, stage.scene.items.len()));
+    let [fovy_deg, aspect] = defaults.shape();
+    let fovy_deg = spec.number("fovy", fovy_deg)?;
+    let aspect = spec.number("aspect", aspect)?;
+    let near = near.unwrap_or(far.unwrap_or(natural) / 1000.0);
+    let visible = visible.transpose()?;
+    spec.finish()?;
+    // That of a place where no parameters replace it; a share of items replaces far.
+    let lens = |own: Option<PlaceView>| -> Result<Lens, CameraError> {
         let Some(own) = own else {
-            return Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far);
+            return Lens::perspective(fovy_deg, aspect, near, far);
         };
-        let [fovy, aspect, near, far] = self.named;
-        let aspect = own.aspect.filter(|_| !aspect).unwrap_or(self.aspect);
-        let fovy_deg = own.fovy_deg.filter(|_| !fovy).unwrap_or(self.fovy_deg);
-        let kind = match own.ortho_height.filter(|_| !fovy) {
+        let aspect = own.aspect.filter(|_| !has_aspect).unwrap_or(aspect);
+        let fovy_deg = own.fovy_deg.filter(|_| !has_fovy).unwrap_or(fovy_deg);
+        let kind = match own.ortho_height.filter(|_| !has_fovy) {
             Some(height) => LensKind::Orthographic { height, aspect },
             None => LensKind::Perspective { fovy_deg, aspect },
         };
-        let near = if near { self.near } else { own.near };
-        let is_named = far || self.visible.is_some();
-        let far = if is_named { self.far } else { own.far };
+        let near = if has_near { near } else { own.near };
+        let is_named = has_far || visible.is_some();
+        let far = if is_named { far } else { own.far };
         Lens::new(kind, near, far.filter(|far| *far <= FARTHEST))
-    }
+    };
+    let up = stage.scene.up;
+    let camera = |pose: &Pose| -> Result<Camera, CameraError> {
+        let (ahead, own) = (pose.forward, pose.view.map(|view| view.up));
+        let has_level = ahead.x.abs() + ahead.y.abs() > 1e-6 * ahead.z.abs();
+        // y is up for a camera that looks straight up or down.
+        let upward = own.unwrap_or(if has_level { DVec3::Z } else { DVec3::Y });
+        let axes = [pose.eye, pose.forward, upward];
+        let [eye, forward, upward] = axes.map(|v| up.from_z_up(v));
+        let frame = Frame::looking_along(eye, forward, upward)?;
+        let lens = lens(pose.view)?;
+        let mut camera = Camera { frame, lens };
+        if pose.magnification != 1.0 {
+            camera.zoom(pose.magnification)?;
+        }
+        Ok(camera)
+    };
+    let numbered = poses.iter().enumerate().map(|(index, pose)| {
+        camera(pose).map_err(|error| {
+            InputError::new(format_args!("path '{path}', camera {index}: {error}"))
+        })
+    });
+    Ok((numbered.collect::<Result<_>>()?, visible))
 }
 
 /// `visible=2%` is a share of the items, `visible=2000` a count of them; 1 would
@@ -437,12 +418,6 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
     Err(SpecError::new(format_args!(
         "visible={text}; expected a share between 0 and 1 (2%){count}"
     )))
-}
-
-/// z, or y for a camera that looks straight up or down.
-fn up_for(forward: DVec3) -> DVec3 {
-    let has_level = forward.x.abs() + forward.y.abs() > 1e-6 * forward.z.abs();
-    if has_level { DVec3::Z } else { DVec3::Y }
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ impl Ray {
 
     /// Returns `true` if a depth between two bounds is from near to far.
     ///
-    /// Where the bounds leave it open, `compare` decides: the depth against another.
+    /// Compares the depth with another by `compare` where the bounds leave it open.
     #[inline(always)]
     pub fn reaches(&self, [least, most]: [f64; 2], compare: impl Fn(f64) -> Ordering) -> bool {
         let is_before = least < self.near && compare(self.near).is_lt();

@@ -45,7 +45,8 @@ const AXES: f64 = 1e-12;
 /// A camera's image, ready to place boxes in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    grid: SampleGrid,
+    /// Columns and rows.
+    pub grid: SampleGrid,
     window: [f64; 4],
     eye: DVec3,
     axes: [DVec3; 3],
@@ -221,16 +222,11 @@ impl<B: Body> Canvas<B> {
 
     /// Takes the samples of another camera, in the same memory.
     pub fn turn_to(&mut self, rays: &Rays) {
-        let grid = self.grid();
+        let grid = self.screen.grid;
         self.screen = Screen::of(rays, grid);
         self.probes.clear();
         let all = rays.of_grid(grid);
         all.for_each(|ray| self.probes.push(B::probe(&ray, self.origin)));
-    }
-
-    /// Columns and rows.
-    pub fn grid(&self) -> SampleGrid {
-        self.screen.grid
     }
 
     /// Calls `visit` with each sample of a rectangle that the stencil lets through.
@@ -246,7 +242,7 @@ impl<B: Body> Canvas<B> {
         let Rectangle { columns, rows } = rectangle.unwrap_or_default();
         for row in rows {
             for column in columns.clone() {
-                let sample = (row * self.grid().width + column) as usize;
+                let sample = (row * self.screen.grid.width + column) as usize;
                 if stencil.is_some_and(|stencil| !stencil.marked[sample]) {
                     kept_out += 1;
                     continue;

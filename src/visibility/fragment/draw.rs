@@ -199,7 +199,7 @@ impl Drawn {
     ///
     /// A rectangle is a box without thickness along one axis.
     pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
-        let mut marked = vec![false; canvas.grid().samples()];
+        let mut marked = vec![false; canvas.screen.grid.samples()];
         let mut tested = 0;
         for rectangle in rectangles {
             let place = canvas.screen.rectangle(rectangle);

@@ -32,7 +32,7 @@ fn sorted(order: DrawOrder, camera: &Camera, solids: &Solids) -> (Vec<ItemId>, V
 
 /// Draws bodies in this order on an empty image.
 fn draw(canvas: &Canvas, bodies: impl IntoIterator<Item = SolidBox>, tests: &Tests<'_>) -> Drawn {
-    let mut drawn = Drawn::new(canvas.grid().samples());
+    let mut drawn = Drawn::new(canvas.screen.grid.samples());
     drawn.draw(canvas, bodies, tests);
     drawn
 }

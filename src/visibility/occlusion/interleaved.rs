@@ -25,7 +25,8 @@ const DEFAULT_DRAWN_PART: u32 = 65_536;
 /// The interleaved coupling, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
 pub struct Interleaved<B> {
-    buffer: B,
+    /// As the last view left it.
+    pub buffer: B,
     kernel: Kernel,
     /// Survivors are drawn that may cover at least the image's pixels divided by this.
     pub(super) drawn_part: u32,
@@ -74,11 +75,6 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// roughly.
     pub fn cull(&mut self, scene: &OccluderScene, view: &View, out: &mut Vec<ItemId>) -> CullStats {
         self.kernel.run(Walk(self, scene, view, out))
-    }
-
-    /// The buffer as the last view left it.
-    pub fn buffer(&self) -> &B {
-        &self.buffer
     }
 }
 

@@ -17,8 +17,8 @@ use crate::visibility::{Guarantee, Rays, Row};
 /// as long.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pvs {
-    /// Ascending.
-    rows: Box<[Box<[RegionId]>]>,
+    /// Ascending, a row for each region.
+    pub rows: Box<[Box<[RegionId]>]>,
 }
 
 /// Most regions of a set.
@@ -51,12 +51,6 @@ impl Pvs {
         (regions <= MOST_REGIONS).then(|| Pvs {
             rows: all.clone().map(row).collect(),
         })
-    }
-
-    /// Number of regions.
-    #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
-    pub fn len(&self) -> usize {
-        self.rows.len()
     }
 
     /// The regions that a region sees, ascending.

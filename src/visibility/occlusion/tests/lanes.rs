@@ -158,7 +158,7 @@ fn sixteen_at_once_are_each_one_by_itself() {
             culler.cull(&ready.occluders, view, &mut Vec::new());
             let rects = Kernel::best().run(Projected(&ready, view));
             for kernel in Kernel::available() {
-                let answers = kernel.run(Hidden(culler.buffer(), &rects));
+                let answers = kernel.run(Hidden(&culler.buffer, &rects));
                 assert!(
                     answers.iter().all(|[at_once, each]| at_once == each),
                     "{kernel}"
