@@ -263,9 +263,7 @@ impl Orders {
         let block = count * (1 + count % 2);
         let turn = self.turn.checked_rem(block).unwrap_or(0);
         if turn == 0 {
-            for i in (1..count).rev() {
-                self.names.swap(i, self.rng.below(i + 1));
-            }
+            self.rng.shuffle(&mut self.names);
         }
         self.turn += 1;
         // 0, 1, n-1, 2, n-2, ...: every difference once.

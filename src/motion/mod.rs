@@ -141,10 +141,7 @@ impl Motion {
             };
             return unfit(format!("{found}; expected {expected}"));
         }
-        let mut rng = SeededRng::new(seed);
-        for i in (1..order.len()).rev() {
-            order.swap(i, rng.below(i + 1));
-        }
+        SeededRng::new(seed).shuffle(&mut order);
         let movers = ((order.len() as f64 * share).round() as usize).clamp(1, order.len());
         let generated = Generated {
             law,

@@ -236,9 +236,7 @@ pub fn grid3(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
         WorldBox::around(centre, DVec3::splat(2.0))
     });
     let mut boxes: Vec<WorldBox> = boxes.collect();
-    for last in (1..n * usize::from(shuffled)).rev() {
-        boxes.swap(last, rng.below(last + 1));
-    }
+    rng.shuffle(&mut boxes[..n * usize::from(shuffled)]);
     Ok(boxes)
 }
 

@@ -32,6 +32,13 @@ impl SeededRng {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }
 
+    /// Puts all in random order (Fisher and Yates, as Durstenfeld 1964 has it).
+    pub fn shuffle<T>(&mut self, all: &mut [T]) {
+        for last in (1..all.len()).rev() {
+            all.swap(last, self.below(last + 1));
+        }
+    }
+
     /// A point in the unit cube.
     pub fn point(&mut self) -> DVec3 {
         DVec3::new(self.unit(), self.unit(), self.unit())

@@ -1,6 +1,6 @@
 //! Cells of a grid over a closed surface, and the search for boxes of them.
 //!
-//! Cells only propose boxes; `proof` proves those that are used.
+//! Cells only propose boxes; those that are used are proven.
 
 use std::ops::Range;
 

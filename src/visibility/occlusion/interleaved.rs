@@ -25,7 +25,7 @@ const DEFAULT_DRAWN_PART: u32 = 65_536;
 /// The interleaved coupling, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
 pub struct Interleaved<B> {
-    /// As the last view left it.
+    /// The buffer as the last view left it.
     pub buffer: B,
     kernel: Kernel,
     /// Survivors are drawn that may cover at least the image's pixels divided by this.
