@@ -57,7 +57,7 @@ impl Ray {
     #[inline(always)]
     pub fn reaches(&self, [least, most]: [f64; 2], compare: impl Fn(f64) -> Ordering) -> bool {
         let is_before = least < self.near && compare(self.near).is_lt();
-        !is_before && !(most > self.far && compare(self.far).is_gt())
+        !(is_before || most > self.far && compare(self.far).is_gt())
     }
 }
 
