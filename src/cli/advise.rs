@@ -89,8 +89,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
 /// The inputs of the command, which tells what is left out, or of a worker.
 fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> Result<Setting> {
     let study = &args.study;
-    let held = |structures| [structures as u64, 0];
-    let mut setting = load(registry, study, ROUNDS, timing, held)?;
+    let mut setting = load(registry, study, ROUNDS, timing, [1, 0, 0])?;
     setting.structures = plan(registry, args)?.structures;
     let all = text::counted(setting.path.cameras.len(), "camera");
     if setting.path.cameras.len() > MOST_CAMERAS && timing.is_none() {

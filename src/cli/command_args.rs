@@ -122,7 +122,6 @@ pub enum SceneCommand {
 #[derive(Args, Debug)]
 pub struct SceneInfoArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
-    #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Cameras to show as used: a path, or a cameras CSV
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
@@ -136,7 +135,6 @@ pub struct SceneInfoArgs {
 #[derive(Args, Debug)]
 pub struct SceneGenerateArgs {
     /// A spec such as city:n=100000,seed=7, or any other scene
-    #[arg(value_name = "SCENE")]
     pub scene: String,
     /// The file to write [default: standard output]
     #[arg(long, short, value_name = "FILE")]
@@ -152,7 +150,6 @@ pub struct SceneConvertArgs {
     #[arg(value_name = "INPUT")]
     pub scene: String,
     /// The file to write [default: standard output]
-    #[arg(value_name = "OUTPUT")]
     pub output: Option<PathBuf>,
     /// The file to write, in place of OUTPUT
     #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
@@ -172,7 +169,6 @@ pub struct SceneConvertArgs {
 }))]
 pub struct SceneDrawArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
-    #[arg(value_name = "SCENE")]
     pub scene: String,
     /// A structure whose cells are drawn, e.g. quadtree-textbook:leaf=4
     #[arg(long, value_name = "STRUCTURE")]

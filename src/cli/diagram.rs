@@ -17,6 +17,8 @@ pub struct Point {
     pub wide: Option<[f64; 2]>,
     /// Text on pointing at it; empty for none.
     pub note: String,
+    /// Name of its height, if that has one.
+    pub level: String,
     pub is_cross: bool,
     pub is_large: bool,
 }

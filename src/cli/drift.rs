@@ -174,10 +174,8 @@ fn arm_figures(report: &DriftReport) -> Vec<Figure> {
     let figure = |points: &[ArmPoint]| {
         let methods = points.chunk_by(|a, b| a.method == b.method);
         let series = methods.enumerate().map(|(n, own)| Series {
-            name: own[0].method.to_owned(),
             look: Look::nth(n),
-            is_scan: false,
-            points: own.iter().filter_map(place).collect(),
+            ..Series::of(own[0].method, false, own.iter().filter_map(place).collect())
         });
         let (arm, k) = (points[0].setting.arm.name(), points[0].setting.stiffness);
         let caption = format!("{arm} arm, k = {k:e}/s2, {RATE_HZ} Hz: position error against time");

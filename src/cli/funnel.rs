@@ -35,14 +35,10 @@ use crate::visibility::{Guarantee, SampleGrid};
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     expect_folder("--csv", args.csv.as_deref())?;
     let folder = args.csv.as_ref().filter(|folder| folder.is_dir());
-    let tables: Vec<_> = TABLES
-        .lines()
-        .map(|line| Some(table_file(folder?, line)))
-        .collect();
-    let outputs = [("--svg", &args.svg), ("--html", &args.html)].into_iter();
-    let outputs: Vec<_> = outputs
-        .chain(tables.iter().map(|file| ("--csv", file)))
-        .collect();
+    let tables = TABLES.lines().map(|line| Some(table_file(folder?, line)));
+    let tables: Vec<_> = tables.collect();
+    let mut outputs = vec![("--svg", &args.svg), ("--html", &args.html)];
+    outputs.extend(tables.iter().map(|file| ("--csv", file)));
     let inputs = [Path::new(&args.study.scene), args.study.path.as_ref()];
     expect_places(&outputs, &inputs)?;
     let setting = setting(registry, args, None)?;
@@ -140,7 +136,7 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
 
 /// Loads the scene, path and structures of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Setting> {
-    let held = |structures| [structures as u64 + 2, funnel::BYTES_PER_TRIANGLE];
+    let held = [1, 2, funnel::BYTES_PER_TRIANGLE];
     load(registry, &args.study, ROUNDS, timing, held)
 }
 

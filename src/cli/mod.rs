@@ -66,7 +66,7 @@ use crate::index::Registry;
 use crate::input::{InputError, hold_files, tell_notes, tell_warnings};
 use crate::report::{folder_of, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene, split_part};
-use crate::shown::expected_by;
+use crate::shown::{expected_by, kind_of};
 use anyhow::{Context, Result, ensure};
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
@@ -402,17 +402,13 @@ fn told_once(error: &anyhow::Error) -> String {
     }
 }
 
-/// Returns true for an error that is or wraps a broken pipe. `io` and `csv` errors
-/// wrap one another without naming each other as the source.
+/// Returns true for an error that is or wraps a broken pipe.
 fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
-    if let Some(io) = error.downcast_ref::<io::Error>() {
-        return io.kind() == io::ErrorKind::BrokenPipe
-            || io.get_ref().is_some_and(|inner| is_broken_pipe(inner));
-    }
-    match error.downcast_ref::<csv::Error>().map(csv::Error::kind) {
-        Some(csv::ErrorKind::Io(io)) => is_broken_pipe(io),
-        _ => false,
-    }
+    let io = match error.downcast_ref().map(csv::Error::kind) {
+        Some(csv::ErrorKind::Io(io)) => Some(io),
+        _ => error.downcast_ref(),
+    };
+    io.is_some_and(|io| kind_of(io) == io::ErrorKind::BrokenPipe)
 }
 
 /// Writes a whole text at once: clap's own writers panic on a closed pipe.

@@ -74,8 +74,7 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
 
 /// The inputs of the command itself, or of a worker.
 fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
-    let held = |structures| [2 * structures as u64, 0];
-    load(registry, &args.study, ROUNDS, timing, held)
+    load(registry, &args.study, ROUNDS, timing, [2, 0, 0])
 }
 
 /// Times all points in one process.
@@ -217,18 +216,16 @@ fn measured(point: &Point) -> Option<Measured> {
     let missed = missed(point);
     let (name, time) = (named(point), text::some(point.query_ns(), text::time));
     let (rate, extra) = (point.excess?, text::rate(point.excess, 100.0));
-    Some(Measured {
-        structure: point.structure.clone(),
-        test: point.names.test.to_owned(),
-        point: diagram::Point {
-            at: [point.query_ns()?, rate.value * 100.0],
-            ends: rate.times(100.0).ends(),
-            wide: point.time.and_then(ends),
-            note: format!("{name}: {time}, false positives {extra} %, {missed} missed"),
-            is_cross: missed > 0,
-            is_large: point.on_front,
-        },
-    })
+    let place = diagram::Point {
+        at: [point.query_ns()?, rate.value * 100.0],
+        ends: rate.times(100.0).ends(),
+        wide: point.time.and_then(ends),
+        note: format!("{name}: {time}, false positives {extra} %, {missed} missed"),
+        level: point.names.test.to_owned(),
+        is_cross: missed > 0,
+        is_large: point.on_front,
+    };
+    Some((point.structure.clone(), place))
 }
 
 /// False positives against time; `None` without any point.

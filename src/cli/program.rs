@@ -70,10 +70,8 @@ fn value(error: &clap::Error) -> Option<String> {
 /// The error on one line; `None` for requested help or version, and for the help in
 /// place of a missing command.
 pub fn one_line(error: &clap::Error) -> Option<String> {
-    use ErrorKind::{
-        DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand as NoCommand, DisplayVersion,
-    };
-    if matches!(error.kind(), DisplayHelp | NoCommand | DisplayVersion) {
+    let no_command = ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    if !error.use_stderr() || error.kind() == no_command {
         return None;
     }
     if let Some(line) = value(error) {

@@ -4,10 +4,9 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
+use std::mem;
 use std::path::Path;
 
-use serde::Serializer;
-use serde::ser::SerializeSeq;
 use serde_json::{Map, Value, json};
 
 use super::args::{LocateArgs, QueryArgs};
@@ -28,10 +27,8 @@ const PLACES: &str = "places";
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
-    let (defaults, culling) = (
-        args.culling.lens.defaults()?,
-        args.culling.culling(&args.test)?,
-    );
+    let defaults = args.culling.lens.defaults()?;
+    let culling = args.culling.culling(&args.test)?;
     let mut scene = load_scene(&args.scene, &args.culling.lens.scene_args.options(1))?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let mut motion = None;
@@ -304,49 +301,42 @@ pub fn write(
     ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
 ) -> anyhow::Result<bool> {
     let mut out = BufWriter::new(io::stdout().lock());
-    let agree = match format {
-        RowFormat::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            // Written with the first row: an error before it is all that is said.
-            let mut header = Some(columns.iter().map(|column| column.0));
-            let mut put = |rows: Vec<Row>| -> csv::Result<()> {
-                if let Some(columns) = header.take() {
-                    csv.write_record(columns)?;
-                }
-                let cells = |row| columns.iter().map(move |(_, value)| cell(&value(row)));
-                let mut rows = rows.iter().map(cells);
-                rows.try_for_each(|cells| csv.write_record(cells))
-            };
-            let agree = ask(&mut |rows| unread_is_fine(put(rows).map_err(io::Error::from)));
-            if agree.is_ok() {
-                unread_is_fine(put(Vec::new()).map_err(io::Error::from))?;
-            }
-            unread_is_fine(csv.flush())?;
-            agree
-        }
-        RowFormat::Json => {
-            let mut json = serde_json::Serializer::pretty(&mut out);
-            let mut array = json.serialize_seq(None).map_err(io::Error::from)?;
-            let object = |row: &Row| -> Map<String, Value> {
-                let field = |(name, value): &Column<'_, Row>| ((*name).to_owned(), value(row));
-                columns.iter().map(field).collect()
-            };
-            let agree = ask(&mut |rows| {
-                let mut rows = rows.iter().map(object);
-                let put = rows.try_for_each(|object| array.serialize_element(&object));
-                unread_is_fine(put.map_err(io::Error::from))
-            });
-            unread_is_fine(array.end().map_err(io::Error::from))?;
-            unread_is_fine(writeln!(out))?;
-            agree
-        }
+    // Written with the next row: an error before the first is all that is said.
+    let mut before = match format {
+        RowFormat::Csv => record(columns.iter().map(|column| column.0))?,
+        RowFormat::Json => b"[".to_vec(),
     };
-    match agree {
-        Ok(_) => unread_is_fine(out.flush())?,
+    let mut put = |row: &Row| -> io::Result<()> {
+        out.write_all(&mem::take(&mut before))?;
+        let values = columns.iter();
+        let values = values.map(|(name, value)| ((*name).to_owned(), value(row)));
+        if format == RowFormat::Csv {
+            return out.write_all(&record(values.map(|(_, value)| cell(&value)))?);
+        }
+        before = b",".to_vec();
+        let object = serde_json::to_string_pretty(&Map::from_iter(values))?;
+        write!(out, "\n  {}", object.replace('\n', "\n  "))
+    };
+    let agree = ask(&mut |rows| unread_is_fine(rows.iter().try_for_each(&mut put)));
+    let end = match (format, &before[..]) {
         // No answers but a beginning: it is not shown.
-        Err(_) => drop(out.into_parts()),
-    }
+        _ if agree.is_err() => {
+            drop(out.into_parts());
+            return agree;
+        }
+        (RowFormat::Csv, header) => header,
+        (_, b"[") => b"[]\n",
+        _ => b"\n]\n",
+    };
+    unread_is_fine(out.write_all(end).and_then(|()| out.flush()))?;
     agree
+}
+
+/// A line of CSV.
+fn record(cells: impl IntoIterator<Item = impl AsRef<[u8]>>) -> csv::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(cells)?;
+    csv.into_inner().map_err(|error| error.into_error().into())
 }
 
 /// A value as CSV holds it: ids separated by spaces, nothing for null.

@@ -18,8 +18,8 @@ use super::page::{glossary, origin};
 use super::run_table::{self, distinct, name, question};
 use super::surface_tables::{self, Picture};
 use super::{
-    Ending, expect_folder, expect_places, program, run_figures, run_plan, text, write_if,
-    write_text,
+    Ending, expect_folder, expect_places, program, run_figures, run_plan, run_verdict, text,
+    write_if, write_text,
 };
 use crate::measure::{Metric, Status};
 use crate::report::{
@@ -129,7 +129,7 @@ pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
         let notes = run_table::reasons(&group).into_iter();
         let notes = notes.chain(run_table::choices(&group));
         blocks.extend(notes.map(Block::Line));
-        blocks.push(Block::Line(run_table::conclusion(&group, &overall)));
+        blocks.push(Block::Line(run_verdict::conclusion(&group, &overall)));
     }
     // A world of one size has its ranked tables; that is the surface.
     blocks.extend(surface_tables::blocks(report, 2));
@@ -146,7 +146,7 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     let groups = run_table::groups(&all);
     for (group, of) in groups.iter().zip(run_table::settings(&groups)) {
         let overall = Overall::of(group);
-        let conclusion = run_table::conclusion(group, &overall);
+        let conclusion = run_verdict::conclusion(group, &overall);
         blocks.push(Block::Line(text::labelled(&of, &conclusion)));
         if let Some(base) = overall.base.filter(|_| group.len() > 1) {
             let names = group.iter().map(|comparison| run_figures::of(comparison));

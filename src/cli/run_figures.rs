@@ -144,11 +144,10 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         let most = visible.iter().copied().fold(1, u64::max);
         let count = |items: f64| text::count(items as usize);
         let point = |(frame, items): (usize, &u64)| Point::new([frame as f64, *items as f64]);
+        let points = visible.iter().enumerate().map(point).collect();
         let series = Series {
-            name: "visible items".to_owned(),
             look: Look::nth(0),
-            is_scan: true,
-            points: visible.iter().enumerate().map(point).collect(),
+            ..Series::of("visible items", true, points)
         };
         let mut y = Axis::linear("", 0.0..most as f64, &count);
         y.ticks = y.all_ticks();
@@ -180,7 +179,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     comparisons.get(1)?;
     let measured = |cell: &ReportCell| {
         let (time, error) = (cell.metrics.get("query_ns")?, cell.value("excess")?);
-        let (structure, test) = (cell.structure.clone(), cell.test.clone());
+        let (structure, test) = (&cell.structure, &cell.test);
         let (within, extra) = (text::time_within(time.estimate()), error * 100.0);
         let percent = text::significant(extra);
         let point = Point {
@@ -188,36 +187,28 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
             wide: ends(time.estimate()),
             note: format!("{structure} {test}: {within}, {percent} % false positives"),
             is_large: true,
+            level: test.clone(),
             ..Point::default()
         };
-        Some(Measured {
-            structure,
-            test,
-            point,
-        })
+        Some((structure.clone(), point))
     };
     let cells = comparisons.iter().flat_map(|comparison| comparison.sound());
     let mut points: Vec<Measured> = cells.filter_map(measured).collect();
-    points.sort_by(|a, b| a.point.at[0].total_cmp(&b.point.at[0]));
+    points.sort_by(|(_, a), (_, b)| a.at[0].total_cmp(&b.at[0]));
     let caption = format!("{}: error against run time, by test", of(first));
     against(&caption, 1e-4, points)
 }
 
-/// A point of a structure with a test.
-pub struct Measured {
-    pub structure: String,
-    pub test: String,
-    /// Time and error; large if it is on the front, a cross if it misses something that
-    /// is to be found.
-    pub point: Point,
-}
+/// A structure, and its time and error at the level of a test; large if it is on the
+/// front, a cross if it misses something that is to be found.
+pub type Measured = (String, Point);
 
 /// Points of the front that are better the longer they take.
 ///
 /// The others are on it for their memory or for what they do not miss.
 fn front(points: &[Measured]) -> Vec<[f64; 2]> {
     let mut least = f64::INFINITY;
-    let points = points.iter().map(|own| &own.point);
+    let points = points.iter().map(|own| &own.1);
     let places = points.filter(|point| point.is_large).map(|point| point.at);
     let better = |at: &[f64; 2]| {
         let is_better = at[1] < least;
@@ -229,7 +220,7 @@ fn front(points: &[Measured]) -> Vec<[f64; 2]> {
 
 /// The tests at each height, near ones together.
 fn levels(points: &[Measured]) -> Vec<(f64, String)> {
-    let places = points.iter().map(|own| (own.point.at[1], &own.test));
+    let places = points.iter().map(|(_, point)| (point.at[1], &point.level));
     let mut places: Vec<(f64, &String)> = places.collect();
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
     let near = |a: &(f64, &String), b: &(f64, &String)| b.0 / a.0 < 1.25;
@@ -247,17 +238,15 @@ fn levels(points: &[Measured]) -> Vec<(f64, String)> {
 pub fn against(caption: &str, none: f64, mut points: Vec<Measured>) -> Option<Figure> {
     points.first()?;
     let all = points.len();
-    for own in &mut points {
-        let point = &mut own.point;
+    for (_, point) in &mut points {
         point.at[1] = point.at[1].max(none);
         point.ends = point.ends.map(|ends| ends.map(|end| end.max(none)));
     }
-    points.retain(|own| own.point.at.iter().all(|value| is_drawn(*value)));
+    points.retain(|(_, point)| point.at.iter().all(|value| is_drawn(*value)));
     let beyond = all - points.len();
     let (front, levels) = (front(&points), levels(&points));
     let mut series: Vec<Series> = Vec::new();
-    let points = points.into_iter();
-    for (structure, own) in grouped(points.map(|own| (own.structure, own.point))) {
+    for (structure, own) in grouped(points.into_iter()) {
         let points = own.into_iter().map(|mut point| {
             point.is_large = front.contains(&point.at);
             point.wide = point.wide.filter(|_| point.is_large);
@@ -307,10 +296,15 @@ mod tests {
     #[test]
     fn zero_is_no_step_of_the_axis() {
         for none in [3e-5, 3e-3] {
-            let point = |error: f64| Measured {
-                structure: "bvh".to_owned(),
-                test: error.to_string(),
-                point: Point::new([100.0, error]),
+            let point = |error: f64| {
+                let level = error.to_string();
+                let at = [100.0, error];
+                let point = Point {
+                    at,
+                    level,
+                    ..Point::default()
+                };
+                ("bvh".to_owned(), point)
             };
             let points = vec![point(0.0), point(1.0)];
             let drawn = against("", none, points).unwrap().parts;

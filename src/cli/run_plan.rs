@@ -16,7 +16,7 @@ use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
 use crate::path::{self, DEFAULT_PATH, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, FETCHED, LoadOptions, Scene, every_part, split_part};
+use crate::scene::{self, FETCHED, LoadOptions, every_part, split_part};
 use crate::suite::{REAL, REAL_PATHS, SUITES, Suite};
 
 /// A plan with where it comes from.
@@ -142,7 +142,7 @@ impl RunPlan {
         for scene in &self.plan.scenes {
             scene::check_fits(&scene.source, &self.plan.load)?;
         }
-        self.check_scenes(&|_, _| Ok(()))
+        self.check_scenes(&[])
     }
 
     /// Checks that the plan of a run that was begun is still the same, and so are its
@@ -155,31 +155,11 @@ impl RunPlan {
                  a new run, or resume the shards"
             );
         }
-        self.check_scenes(&|scene, asked| {
-            let of_scene = |kept: &&KeptPart| kept.part.key.scene == scene.name;
-            let mut parts = begun.parts.iter().filter(of_scene).map(|kept| &kept.part);
-            match asked {
-                None => {
-                    let known = parts.find(|part| !part.scene.digest.is_empty());
-                    let before = known.map(|part| part.scene.digest.clone());
-                    same_digest("scene", &scene.name, before, || scene.digest())
-                }
-                Some((name, workload)) => {
-                    let motion = workload.motion.as_ref().map_or("", |motion| &motion.name);
-                    let own = |part: &&Part| part.key.path == name && part.key.motion == motion;
-                    let before = parts.filter(own).find_map(|part| part.path.digest.clone());
-                    let (what, name) = match motion {
-                        "" => ("path", name),
-                        motion => ("path or motion", motion),
-                    };
-                    same_digest(what, name, before, || workload.digest())
-                }
-            }
-        })
+        self.check_scenes(&begun.parts)
     }
 
-    /// Loads every scene and then every path of it, with a look at each.
-    fn check_scenes(&self, look: Look) -> Result<()> {
+    /// Loads every scene and every path of it, which are those of the parts `begun`.
+    fn check_scenes(&self, begun: &[KeptPart]) -> Result<()> {
         let plain = Culling::default();
         let is_plain = |culling: &Culling| {
             (culling.arithmetic, culling.planes) == (plain.arithmetic, plain.planes)
@@ -191,7 +171,11 @@ impl RunPlan {
         }
         for PlannedScene { source, paths, .. } in &self.plan.scenes {
             let scene = scene::load(source, &self.plan.load)?;
-            look(&scene, None)?;
+            let parts = begun.iter().map(|kept| &kept.part);
+            let parts = parts.filter(|part| part.key.scene == scene.name);
+            let known = parts.clone().find(|part| !part.scene.digest.is_empty());
+            let before = known.map(|part| part.scene.digest.clone());
+            same_digest("scene", &scene.name, before, || scene.digest())?;
             for source in paths {
                 let path = path::load(source, &scene, &self.plan.lens)?;
                 for culling in &self.plan.cullings {
@@ -202,7 +186,15 @@ impl RunPlan {
                         let (motion, views) = (motion.transpose()?, self.plan.views_per_frame);
                         let motion = motion.inspect(|own| own.tell_numbers(&path, views));
                         let workload = Workload::moving(&scene, &path, culling, motion, views)?;
-                        look(&scene, Some((source, &workload)))?;
+                        let moved = workload.motion.as_ref().map_or("", |own| &own.name);
+                        let (what, name) = match moved {
+                            "" => ("path", source.as_str()),
+                            _ => ("path or motion", moved),
+                        };
+                        let is_it = |p: &&Part| p.key.path == *source && p.key.motion == moved;
+                        let mut own = parts.clone().filter(is_it);
+                        let before = own.find_map(|part| part.path.digest.clone());
+                        same_digest(what, name, before, || workload.digest())?;
                     }
                 }
             }
@@ -211,9 +203,6 @@ impl RunPlan {
         Ok(())
     }
 }
-
-/// Told of a scene, and then of each of its workloads with the name of the path.
-type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &Workload)>) -> Result<()>;
 
 /// Refuses what a run was begun with if it is another now.
 pub fn same_digest(

@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use super::document::{Block, Table};
-use super::{run_verdict, scene_facts, text};
+use super::{scene_facts, text};
 use crate::culling::{Culling, CullingTest};
 use crate::measure::{CellKey, GroupKey, Status};
 use crate::path::CameraFacts;
@@ -28,14 +28,6 @@ pub fn settings(groups: &[Vec<&Comparison>]) -> Vec<String> {
     let parts: Vec<usize> = (0..3).filter(differs).collect();
     let name = |key: &[&str; 3]| text::joined(parts.iter().map(|&n| key[n].replace("_ns", "")));
     keys.iter().map(name).collect()
-}
-
-/// Conclusion of a group in sentences.
-pub fn conclusion(group: &[&Comparison], overall: &Overall) -> String {
-    match group {
-        [one] => run_verdict::of_one(one, overall.base),
-        _ => run_verdict::of_many(group, overall),
-    }
 }
 
 /// Cache state, culling test and kind of time: times of others are not averaged.

@@ -3,6 +3,7 @@
 //! The winner, its lead over the next best and over the base, the queries that repay its
 //! build, and how its answers were checked.
 
+use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::text;
@@ -10,11 +11,12 @@ use crate::measure::{SharedWork, Status, YARDSTICK};
 use crate::report::{Comparison, Mean, Overall, ReportCell, times_as_fast};
 
 /// "a", "a and b", "a, b and c".
-fn listed(names: &[&str], last: &str) -> String {
-    match names {
-        [] => String::new(),
-        [one] => (*one).to_owned(),
-        [first @ .., end] => format!("{} {last} {end}", first.join(", ")),
+fn listed<N: Borrow<str> + ToString>(names: &[N], last: &str) -> String {
+    match names.split_last() {
+        Some((end, first @ [_, ..])) => {
+            format!("{} {last} {}", first.join(", "), end.to_string())
+        }
+        _ => names.concat(),
     }
 }
 
@@ -31,16 +33,27 @@ pub fn times(ratio: f64) -> String {
     format!("{} x", text::significant(ratio))
 }
 
-/// Conclusion of one scene and path.
-pub fn of_one(comparison: &Comparison, base: Option<&str>) -> String {
-    let mut told = vec![ranking(comparison, base)];
-    let of_several = base.filter(|_| comparison.sound().nth(1).is_some());
-    told.extend(of_several.and_then(fallback));
-    told.extend(repaid(comparison, base));
-    told.extend(gains(&SharedWork::of(comparison.sound())));
-    told.extend(checked(&[comparison]));
-    told.extend(failed(&[comparison]));
-    told.extend(caveats(&[comparison]));
+/// Conclusion of one or several scenes and paths in sentences.
+pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
+    let base = overall.base;
+    let (first, is_alone) = match all {
+        [one] => (ranking(one, base), one.sound().nth(1).is_none()),
+        _ => (standing(all, overall), overall.standings.len() < 2),
+    };
+    let mut told = vec![first];
+    // Where it is not the usual one.
+    if let Some(other) = base.filter(|base| *base != YARDSTICK && !is_alone) {
+        told.push(format!(
+            "Speed-ups refer to {other}, the slowest: {YARDSTICK} lacks times."
+        ));
+    }
+    if let [one] = all {
+        told.extend(repaid(one, base));
+        told.extend(gains(&SharedWork::of(one.sound())));
+    }
+    told.extend(checked(all));
+    told.extend(failed(all));
+    told.extend(caveats(all));
     told.join(" ")
 }
 
@@ -128,12 +141,6 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     format!("Take {said}{of_base}.")
 }
 
-/// The base of speed-ups, where it is not the usual one.
-fn fallback(base: &str) -> Option<String> {
-    let other = base != YARDSTICK;
-    other.then(|| format!("Speed-ups refer to {base}, the slowest: {YARDSTICK} lacks times."))
-}
-
 /// The queries after which the build of the fastest has paid.
 ///
 /// `None` where the base is not proven slower.
@@ -205,19 +212,7 @@ fn were(count: usize) -> String {
     }
 }
 
-/// Conclusion of several scenes and paths.
-pub fn of_many(all: &[&Comparison], overall: &Overall) -> String {
-    let ranked = all.iter().filter(|c| c.winners().next().is_some());
-    let mut told = vec![standing(ranked.count(), overall)];
-    let base = overall.base.filter(|_| overall.standings.len() > 1);
-    told.extend(base.and_then(fallback));
-    told.extend(checked(all));
-    told.extend(failed(all));
-    told.extend(caveats(all));
-    told.join(" ")
-}
-
-fn standing(all: usize, overall: &Overall) -> String {
+fn standing(all: &[&Comparison], overall: &Overall) -> String {
     let mut ranked = overall.standings.iter().filter(|s| s.speedup.is_some());
     let (Some(base), Some(best)) = (overall.base, ranked.next()) else {
         return "No structure has times everywhere, so there are no means.".to_owned();
@@ -225,10 +220,11 @@ fn standing(all: usize, overall: &Overall) -> String {
     if let [one] = &overall.standings[..] {
         return format!("{} is the only structure.", one.structure);
     }
-    let tied: Vec<&Mean> = ranked.clone().take_while(|s| s.ties_with(best)).collect();
-    let next = ranked.nth(tied.len());
+    let tied = ranked.clone().take_while(|s| s.ties_with(best));
+    let tied: Vec<&Mean> = [best].into_iter().chain(tied).collect();
+    let next = ranked.nth(tied.len() - 1);
     let lead = best.speedup.unwrap_or(1.0);
-    let names: Vec<&str> = [best].iter().chain(&tied).map(|s| s.structure).collect();
+    let names: Vec<&str> = tied.iter().map(|s| s.structure).collect();
     let mut told = match &names[..] {
         [one] => format!("{one} is the fastest on the whole"),
         _ => format!("{} tie on the whole", listed(&names, "and")),
@@ -244,14 +240,13 @@ fn standing(all: usize, overall: &Overall) -> String {
     let leads: Vec<String> = of_base.into_iter().chain(of_next).collect();
     if !leads.is_empty() {
         let whose = match tied.len() {
-            0 => ":".to_owned(),
+            1 => ":".to_owned(),
             _ => format!("; {} is", names[0]),
         };
         told += &format!("{whose} {}", leads.join(", "));
     }
-    let firsts = [best].into_iter().chain(tied.iter().copied());
-    let firsts: Vec<String> = firsts.map(|s| s.first_in.to_string()).collect();
-    let firsts: Vec<&str> = firsts.iter().map(String::as_str).collect();
+    let firsts: Vec<String> = tied.iter().map(|s| s.first_in.to_string()).collect();
+    let all = all.iter().filter(|c| c.winners().next().is_some()).count();
     told += &format!("; first or tied in {} of {all}.", listed(&firsts, "and"));
     let apart = overall.standings.iter();
     let apart = apart.filter(|s| s.speedup.is_none() && s.first_in > 0);

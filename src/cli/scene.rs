@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use glam::Vec3;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::command_args::{SceneConvertArgs, SceneDrawArgs, SceneGenerateArgs, SceneInfoArgs};
 use super::plan::Plan;
@@ -53,10 +53,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
             value["triangle_count"] = json!(surfaces.triangles.len());
         }
         value["camera_place_count"] = json!(scene.places.len());
-        if let (Some(all), Value::Object(own)) =
-            (value.as_object_mut(), serde_json::to_value(&figures)?)
-        {
-            all.extend(own);
+        let figures = serde_json::to_value(&figures)?;
+        for (name, figure) in figures.as_object().into_iter().flatten() {
+            value[name] = figure.clone();
         }
         for labels in &scene.labels {
             value["labels"][&labels.column] = labels.histogram().into_iter().collect();
@@ -78,33 +77,28 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         ("axes", scene_facts::axes(&info)),
     ];
     rows.extend(figures.rows(&scene));
-    let regions = (people(info.region_count), scene.regions.kind());
-    rows.push(("regions", format!("{}: {}", regions.0, regions.1)));
-    match (&facts, &args.path) {
-        (Some(facts), Some(path)) => {
-            let views = text::counted(cameras.len(), "camera");
-            let lens = scene_facts::lens(facts);
-            rows.push(("cameras", text::plain(&format!("{path}: {views}, {lens}"))));
-            let matrix = facts.matrix.as_ref().map(scene_facts::matrices);
-            rows.extend(matrix.map(|matrix| ("matrices", matrix)));
-        }
-        _ => {
+    let (regions, kind) = (people(info.region_count), scene.regions.kind());
+    let views = text::counted(cameras.len(), "camera");
+    let seen = match facts.as_ref().zip(args.path.as_ref()) {
+        Some((facts, path)) => format!("{path}: {views}, {}", scene_facts::lens(facts)),
+        None => {
             let lens = scene_facts::default_lens(&defaults);
-            rows.push(("cameras", format!("recorded ones without a lens: {lens}")));
+            format!("recorded ones without a lens: {lens}")
         }
-    }
-    if let Some(surfaces) = &scene.surfaces {
-        rows.push(("triangles", people(surfaces.triangles.len())));
-    }
-    if portals > 0 {
-        rows.push(("portals", text::count(portals)));
-    }
-    if !scene.places.is_empty() {
-        rows.push(("places", text::counted(scene.places.len(), "camera")));
-    }
-    if info.skipped_items > 0 {
-        rows.push(("left out", text::counted(info.skipped_items, "bad item")));
-    }
+    };
+    let matrix = facts.as_ref().and_then(|facts| facts.matrix.as_ref());
+    let triangles = scene.surfaces.as_ref().map(|s| s.triangles.len());
+    let (portals, bad) = ((portals > 0).then_some(portals), info.skipped_items);
+    let more = [
+        ("regions", format!("{regions}: {kind}")),
+        ("cameras", text::plain(&seen)),
+        ("matrices", text::some(matrix, scene_facts::matrices)),
+        ("triangles", text::some(triangles, people)),
+        ("portals", text::some(portals, text::count)),
+        ("places", text::any(scene.places.len(), "camera", |all| all)),
+        ("left out", text::any(bad, "bad item", |all| all)),
+    ];
+    rows.extend(more.into_iter().filter(|(_, text)| !text.is_empty()));
     for labels in &scene.labels {
         let counts = labels.histogram();
         let one = |(label, count): &(&str, usize)| {

@@ -2,16 +2,17 @@
 //!
 //! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
+use super::text;
 use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
 };
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{DEFAULT, Execution, MOTION, Registry, StructureSpec, UpdatePolicy};
-use crate::kernel::Kernel;
+use crate::kernel::{KERNELS, Kernel};
 use crate::measure::{Machine, Plan, Protocol};
 use crate::path::{DEFAULT_PATH, LensDefaults};
 use crate::scene::{ITEM_KINDS, ItemKind, LoadOptions, UP_AXES, UpAxis};
-use crate::spec::{SpecError, values};
+use crate::spec::values;
 use crate::threads::MOST_THREADS;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
@@ -167,18 +168,13 @@ fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSp
 #[derive(Args, Debug)]
 pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
-    #[arg(long = "kernel", value_name = "NAME", value_parser = kernel)]
+    #[arg(long = "kernel", value_name = "NAME", value_parser = values::choice("kernel", &KERNELS))]
     pub name: Option<Kernel>,
     /// Threads per build (of query and locate also for cameras and points). With a
     /// list, such as 1,2,4, structures with the parameter 'threads' are entered for each
     #[arg(long, value_name = "N,..", default_value = "1", value_delimiter = ',',
         value_parser = values::whole(1..=MOST_THREADS))]
     pub threads: Vec<usize>,
-}
-
-fn kernel(name: &str) -> Result<Kernel, SpecError> {
-    let known = Kernel::ALL.map(|kernel| (kernel, kernel.name(), ""));
-    values::choice("kernel", &known)(name)
 }
 
 impl KernelArgs {
@@ -205,20 +201,16 @@ impl KernelArgs {
     /// The instruction set, and the largest number of threads.
     ///
     /// Fails if this machine lacks the instruction set, or for a number named twice.
-    pub fn execution(&self) -> Result<Execution, SpecError> {
+    pub fn execution(&self) -> Result<Execution> {
         let kernel = self.name.unwrap_or_else(Kernel::best);
-        if !kernel.is_available() {
-            let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
-            return Err(SpecError::new(format_args!(
-                "kernel '{kernel}' needs instructions that this processor does not have; \
-                 available: {}",
-                here.join(", ")
-            )));
-        }
-        let again = |n: &usize| self.threads.iter().filter(|other| *other == n).count() > 1;
-        if let Some(n) = self.threads.iter().copied().find(again) {
-            let message = format!("--threads: {n} is named twice; expected each once");
-            return Err(SpecError::new(message));
+        ensure!(
+            kernel.is_available(),
+            "kernel '{kernel}' needs instructions that this processor does not have; available: {}",
+            text::joined(Kernel::available().map(Kernel::name))
+        );
+        let again = |n: &&usize| self.threads.iter().filter(|other| other == n).count() > 1;
+        if let Some(n) = self.threads.iter().find(again) {
+            bail!("--threads: {n} is named twice; expected each once");
         }
         Ok(Execution {
             kernel,

@@ -58,14 +58,14 @@ pub fn tell_progress(bar: &ProgressBar, parts: &str, told: &mut Instant) {
 
 /// Loads what the arguments name, in a worker for its `timing`.
 ///
-/// In the command itself `held` gives structures to have room for, by the number of those
-/// named, and bytes per triangle.
+/// The command itself has room for structures, `each` of those named and some `more`, and
+/// for bytes per triangle.
 pub fn load(
     registry: &Registry,
     args: &StudyArgs,
     rounds: [usize; 2],
     timing: Option<&Timing>,
-    held: impl Fn(usize) -> [u64; 2],
+    [each, more, per_triangle]: [u64; 3],
 ) -> anyhow::Result<Setting> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     // An impossible lens is reported before anything is loaded.
@@ -73,7 +73,8 @@ pub fn load(
     let mut options = args.lens.scene_args.options(0);
     let scene = match timing {
         None => {
-            [options.structures, options.per_triangle] = held(structures.len());
+            options.structures = each * structures.len() as u64 + more;
+            options.per_triangle = per_triangle;
             load_scene(&args.scene, &options)?
         }
         Some(_) => scene::load(&args.scene, &options)?,

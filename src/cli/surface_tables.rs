@@ -212,11 +212,11 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
         pictures.push((file_name(words, &pictures), picture(&[figure], 1)));
     };
     for surface in surfaces(comparisons(report)) {
-        let Surface {
-            world, cache, test, ..
-        } = &surface;
         for (shown, figure) in growth(&surface) {
-            add([world, cache, test, &shown], figure);
+            add(
+                [&surface.world, surface.cache, surface.test, &shown],
+                figure,
+            );
         }
     }
     for comparison in &comparisons(report) {

@@ -6,6 +6,9 @@ use std::iter;
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 
+/// How many columns of a terminal a text takes: two for each character of Chinese.
+pub use console::measure_text_width as across;
+
 pub use crate::shown::*;
 use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
@@ -180,11 +183,6 @@ pub fn time_with(metric: &Metric) -> String {
 /// A rate per `units` with its 95 % interval; nothing if there is none.
 pub fn rate(rate: Option<Estimate>, units: f64) -> String {
     some(rate.map(|rate| rate.times(units)), with_ends)
-}
-
-/// How many columns of a terminal a text takes: two for each character of Chinese.
-pub fn across(text: &str) -> usize {
-    console::measure_text_width(text)
 }
 
 /// Text with line breaks in place of spaces in lines longer than `width`.

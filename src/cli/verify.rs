@@ -68,7 +68,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     interrupt::from_now_on_finish();
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
-    let (mut checks, mut skipped_items, mut interrupted) = (Vec::new(), 0, false);
+    let (mut checks, mut skipped_items) = (Vec::new(), 0);
     // The command that checks a scene and path alone has the other options as typed.
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
@@ -86,19 +86,17 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             let words = ["verify", "--scene", source, "--path", &path].map(str::to_owned);
             let again = command_line(&[&words[..], &others].concat());
             checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
-            interrupted = interrupt::asked();
-            if interrupted {
+            if interrupt::asked() {
                 break 'scenes;
             }
         }
         bar.inc(1);
     }
-    if cases > 0 && !interrupted {
+    if cases > 0 && !interrupt::asked() {
         bar.set_message(text::counted(cases as usize, "random case"));
-        let checked = random_cases(&structures, seed, cases);
-        interrupted = checked.first().is_some_and(|c| (c.volumes as u64) < cases);
-        checks.extend(checked);
+        checks.extend(random_cases(&structures, seed, cases));
     }
+    let interrupted = interrupt::asked();
     bar.finish_and_clear();
     let outcome = Outcome {
         ok: checks.iter().all(|c| c.difference.is_none())

@@ -35,10 +35,8 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let out = Some(args.out.clone());
     expect_places(&[("--out", &out)], &[&args.scene, &args.path])?;
     let structures = args.culling.kernel.structures(registry, &args.structure)?;
-    let (defaults, culling) = (
-        args.culling.lens.defaults()?,
-        args.culling.culling(&args.test)?,
-    );
+    let defaults = args.culling.lens.defaults()?;
+    let culling = args.culling.culling(&args.test)?;
     let scene = load_scene(&args.scene, &args.culling.lens.scene_args.options(1))?;
     let items = scene.items.len();
     let (found, most) = (text::count(items), text::count(MOST_ITEMS));

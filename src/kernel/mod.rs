@@ -32,13 +32,11 @@ named! {
     /// An instruction set that queries are compiled for, from the smallest to the
     /// largest.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-    pub enum Kernel {
-        /// Plain arrays: whatever vectors the compiler makes of them, SSE2 or NEON.
+    pub enum Kernel, KERNELS {
         Portable = "portable",
-        /// 256-bit vectors and the bit instructions of the same generation.
-        Avx2 = "avx2",
-        /// 512-bit vectors: a block of sixteen boxes is one register a row.
-        Avx512 = "avx512",
+            "Plain arrays: whatever vectors the compiler makes of them, SSE2 or NEON.";
+        Avx2 = "avx2", "256-bit vectors and the bit instructions of the same generation.";
+        Avx512 = "avx512", "512-bit vectors: a block of sixteen boxes is one register a row.";
     }
 }
 
