@@ -26,7 +26,6 @@ mod funnel;
 mod funnel_table;
 mod interrupt;
 mod list;
-mod merge;
 mod page;
 mod plan;
 mod precision;
@@ -121,8 +120,7 @@ impl Ending {
 /// }
 /// ```
 pub fn main_with(registry: Registry) -> ExitCode {
-    program::set(None);
-    start(registry)
+    start(None, registry)
 }
 
 /// [`main_with`] under the name and the version of another crate, which help texts,
@@ -137,14 +135,14 @@ pub fn main_with(registry: Registry) -> ExitCode {
 /// }
 /// ```
 pub fn main_as(program: (&'static str, &'static str), registry: Registry) -> ExitCode {
-    program::set(Some(program));
-    start(registry)
+    start(Some(program), registry)
 }
 
 /// Place of an error that no file has.
 const OUTPUT: &str = "standard output: ";
 
-fn start(registry: Registry) -> ExitCode {
+fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
+    program::set(program);
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return refused(&error),
@@ -196,7 +194,7 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
     match command {
         Command::List { topic, format } => list::list(registry, topic, format),
         Command::Run(args) => run::run(registry, &args),
-        Command::Merge(args) => merge::merge(&args),
+        Command::Merge(args) => run::merge(&args),
         Command::Report(args) => report::report(&args),
         Command::Compare(args) => compare::compare(registry, &args),
         Command::Query(args) => query::query(registry, &args),
@@ -383,12 +381,10 @@ fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {
 /// The context first, then its causes, but for those that the text before
 /// them has told already.
 fn told_once(error: &anyhow::Error) -> String {
-    let mut text = String::new();
+    let mut text = error.to_string();
     for cause in error.chain().map(ToString::to_string) {
-        if text.is_empty() {
-            text = cause;
-        } else if !text.contains(&cause) {
-            text = format!("{text}: {cause}");
+        if !text.contains(&cause) {
+            text += &format!(": {cause}");
         }
     }
     let mut causes = error.chain();

@@ -38,6 +38,7 @@ impl Plan<'_> {
         let (cells, up) = (self.cells.as_ref(), self.scene.up);
         let outlines = cells.map_or(Vec::new(), |cells| cells.outlines(self.scene));
         notes.extend(cells.iter().flat_map(|cells| cells.notes(up)));
+        notes.retain(|note| !note.is_empty());
         let eye = self.camera.map(|camera| up.to_z_up(camera.frame.eye));
         let corners = outlines.iter().flat_map(|outline| &outline.corners);
         let corners = corners.map(|&corner| [corner; 2]);
@@ -60,7 +61,7 @@ impl Plan<'_> {
         sheet.finished(&self.caption, axes, &body, &self.legend(), &notes)
     }
 
-    /// The items to draw, and what is not drawn.
+    /// The items to draw, and what is not drawn; empty where nothing is left out.
     fn items(&self) -> (Vec<Drawn>, Vec<String>) {
         let (origin, up) = (self.scene.origin, self.scene.up);
         let middle = self.scene.world_bounds();
@@ -90,16 +91,15 @@ impl Plan<'_> {
         all.truncate(MOST_DRAWN);
         let farther = ["farther from the middle", "farther from the eye"];
         let farther = farther[usize::from(self.camera.is_some())];
-        let notes = [(apart, "on other storeys"), (far, farther)].into_iter();
-        let notes = notes.filter(|(count, _)| *count > 0);
-        let notes =
-            notes.map(|(count, why)| format!("not drawn: {} {why}", text::counted(count, "item")));
+        let notes = [(apart, "on other storeys"), (far, farther)].map(|(count, why)| {
+            text::any(count, "item", |items| format!("not drawn: {items} {why}"))
+        });
         let drawn = all.into_iter().map(|(_, rect, class)| Drawn {
             rect,
             class,
             is_outlined: false,
         });
-        (drawn.collect(), notes.collect())
+        (drawn.collect(), notes.into())
     }
 
     /// Lowest and highest z of the rooms at the height of the eye.

@@ -132,20 +132,19 @@ fn of_points(p: &Precision) -> Vec<String> {
     // Cameras without rays have no pixels.
     let by = |point: &Point| (point.worst_miss_px.unwrap_or(-1.0), missed(point));
     let worst = unsafe_.max_by(|a, b| by(a).partial_cmp(&by(b)).unwrap_or(Ordering::Equal));
-    all.push(match worst {
-        Some(worst) => match worst.worst_miss_px {
-            Some(depth) => format!(
-                "Missed items: up to {} pixels deep ({}).",
-                text::significant(depth),
-                named(worst)
-            ),
-            None => format!("Items are missed, most by {}.", named(worst)),
+    all.push(
+        match worst.map(|worst| (named(worst), worst.worst_miss_px)) {
+            Some((name, Some(depth))) => {
+                let depth = text::significant(depth);
+                format!("Missed items: up to {depth} pixels deep ({name}).")
+            }
+            Some((name, None)) => format!("Items are missed, most by {name}."),
+            None if p.points.iter().any(is_wrong) => {
+                "Points of right answers missed no visible item on these cameras.".to_owned()
+            }
+            None => "No point missed a visible item on these cameras.".to_owned(),
         },
-        None if p.points.iter().any(is_wrong) => {
-            "Points of right answers missed no visible item on these cameras.".to_owned()
-        }
-        None => "No point missed a visible item on these cameras.".to_owned(),
-    });
+    );
     all
 }
 

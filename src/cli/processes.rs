@@ -88,21 +88,23 @@ impl Worker {
         self.waited += gap.min(LONGEST_GAP);
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
-            Err(RecvTimeoutError::Timeout) if self.waited > self.patience => {
-                // Its current step is what took too long.
-                self.kill();
+            Err(RecvTimeoutError::Timeout) if self.waited <= self.patience => return Ok(None),
+            Err(ended) => {
                 let (structure, step) = self.doing.clone();
-                let reason = format!("{step} took longer than {} s", self.patience.as_secs());
-                let verdict = Verdict::new(Status::TimedOut, reason);
-                return Ok(Some(Err(Ended::Died(structure, verdict))));
-            }
-            Err(RecvTimeoutError::Timeout) => return Ok(None),
-            Err(RecvTimeoutError::Disconnected) => {
-                let status = self.child.wait()?;
-                let words = self.last_words.take().and_then(|words| words.join().ok());
-                let words = String::from_utf8_lossy(&words.unwrap_or_default()).into_owned();
-                let (structure, step) = self.doing.clone();
-                let verdict = cause(status, &step, &words);
+                let verdict = if ended == RecvTimeoutError::Timeout {
+                    // Its current step is what took too long.
+                    self.kill();
+                    let reason = format!("{step} took longer than {} s", self.patience.as_secs());
+                    Verdict::new(Status::TimedOut, reason)
+                } else {
+                    let status = self.child.wait()?;
+                    let words = self.last_words.take().and_then(|words| words.join().ok());
+                    cause(
+                        status,
+                        &step,
+                        &String::from_utf8_lossy(&words.unwrap_or_default()),
+                    )
+                };
                 return Ok(Some(Err(Ended::Died(structure, verdict))));
             }
         };

@@ -143,8 +143,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
         tell!("note: ids of the new file are its own rows, without the bad items");
     }
     if !lost.is_empty() {
-        let what = "not written; boxes CSV has boxes and labels only";
-        tell!("note: {} {what}", lost.join(", "));
+        tell!("note: {lost} not written; boxes CSV has boxes and labels only");
     }
     if kept.up != UpAxis::default() {
         let up = kept.up.name();
@@ -165,21 +164,18 @@ fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option
 }
 
 /// Parts of a scene that a boxes file cannot hold.
-fn left_behind(scene: &Scene) -> Vec<String> {
+fn left_behind(scene: &Scene) -> String {
     let regions = match scene.regions {
         Regions::Items => 0,
         _ => scene.regions.boxes(&scene.items).len(),
     };
     let triangles = scene.surfaces.as_ref().map_or(0, |s| s.triangles.len());
-    let counts = [
-        (regions, "region"),
-        (scene.places.len(), "camera place"),
-        (triangles, "triangle"),
-    ];
-    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
-    let counts = counts.map(|(count, what)| text::counted(count, what));
-    let own_tree = (scene.own_tree.iter()).map(|_| "the map's own tree".to_owned());
-    counts.chain(own_tree).collect()
+    text::joined([
+        text::any(regions, "region", |all| all),
+        text::any(scene.places.len(), "camera place", |all| all),
+        text::any(triangles, "triangle", |all| all),
+        text::some(scene.own_tree.as_ref(), |_| "the map's own tree".to_owned()),
+    ])
 }
 
 fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
@@ -268,25 +264,19 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     if scene.skipped_items > 0 {
         caption.push(text::items(scene.items.len(), scene.skipped_items));
     }
-    let camera = match &args.camera {
-        None => None,
-        Some(source) => {
-            let path = path::load(source, &scene, &defaults)?;
-            let (frame, last) = (args.frame as usize, path.cameras.len().saturating_sub(1));
-            let Some(camera) = path.cameras.get(frame) else {
-                let cameras = format!("0 to {last}, the cameras of {}", path.name);
-                bail!("--frame is {frame}; expected {cameras}");
-            };
-            caption.push(format!("camera {frame} of {}", path.name));
-            Some((*camera, path.place(frame)))
-        }
-    };
-    let around = scene.surroundings();
-    let view = camera.as_ref().map(|(camera, place)| {
+    let (around, mut seen) = (scene.surroundings(), None);
+    if let Some(source) = &args.camera {
+        let path = path::load(source, &scene, &defaults)?;
+        let (frame, last) = (args.frame as usize, path.cameras.len().saturating_sub(1));
+        let Some(camera) = path.cameras.get(frame) else {
+            let cameras = format!("0 to {last}, the cameras of {}", path.name);
+            bail!("--frame is {frame}; expected {cameras}");
+        };
+        caption.push(format!("camera {frame} of {}", path.name));
         let view = Culling::default().view(camera, &around);
-        view.with_context(|| place.clone())
-    });
-    let view = view.transpose()?;
+        seen = Some((*camera, view.with_context(|| path.place(frame))?));
+    }
+    let view = seen.as_ref().map(|(_, view)| view);
     let index = structure.as_ref().map(|spec| {
         caption.push(format!("{}, levels 0 to {}", spec.label, args.depth));
         spec.build(input_of(&scene, &scene.items))
@@ -294,7 +284,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let index = index.transpose()?;
     let cells = index.as_ref().map_or(Vec::new(), |index| index.cells());
     let verdicts = view.as_ref().map(|view| verdicts(&cells, view.as_any()));
-    let class_of = match (&view, &index, &verdicts) {
+    let (classes, class_of) = match (&view, &index, &verdicts) {
         // By what the query of the structure did with each item.
         (Some(view), Some(index), Some(verdicts)) => {
             let (mut class_of, mut visible) = (vec![REJECTED; scene.items.len()], Vec::new());
@@ -306,13 +296,13 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
                 let class = &mut class_of[item as usize];
                 *class = if *class == ACCEPTED { VISIBLE } else { OUTSIDE };
             }
-            class_of
+            (VERDICTS, class_of)
         }
         (Some(view), ..) => {
             let class = |item: &Aabb| usize::from(view.as_any().sees(item));
-            scene.items.iter().map(class).collect()
+            (SEEN, scene.items.iter().map(class).collect())
         }
-        _ => vec![0; scene.items.len()],
+        _ => (ITEMS, vec![0; scene.items.len()]),
     };
     let class_of_cell = |cell: usize| match verdicts.as_ref().and_then(|all| all[cell]) {
         None => 0,
@@ -323,19 +313,12 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let plan = Plan {
         caption: caption.join("; "),
         scene: &scene,
-        camera: camera.as_ref().map(|(camera, _)| camera),
-        classes: match (&view, &index) {
-            (None, _) => ITEMS,
-            (_, None) => SEEN,
-            _ => VERDICTS,
-        },
+        camera: seen.as_ref().map(|(camera, _)| camera),
+        classes,
         class_of: &|item| class_of[item],
         cells: index.is_some().then(|| Cells {
             cells: &cells,
-            classes: match view {
-                Some(_) => CELL_VERDICTS,
-                None => CELLS,
-            },
+            classes: [CELLS, CELL_VERDICTS][usize::from(view.is_some())],
             class_of: &class_of_cell,
             depth: args.depth,
         }),

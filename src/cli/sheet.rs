@@ -256,25 +256,20 @@ impl Cells<'_> {
         }
     }
 
-    /// Cells and planes that are not drawn.
-    pub fn notes(&self, up: UpAxis) -> Vec<String> {
+    /// Cells and planes that are not drawn; empty where there are none.
+    pub fn notes(&self, up: UpAxis) -> [String; 3] {
         let (drawn, below): (Vec<&TreeCell<'_>>, Vec<_>) =
             (self.cells.iter()).partition(|cell| cell.level <= self.depth);
         let is_level = |side: &Plane| !is_upright(&turned(side, up));
         let sides = drawn.iter().filter_map(|cell| cell.half_space.as_ref());
         let level = sides.filter(|side| is_level(side)).count();
-        let mut notes = vec!["thicker outlines: upper levels".to_owned()];
-        if !below.is_empty() {
-            let below = text::counted(below.len(), "cell");
-            notes.push(format!("not drawn: {below} below level {}", self.depth));
-        }
-        if level > 0 {
-            let level = text::counted(level, "cell");
-            notes.push(format!(
-                "{level} bounded by a plane that is not upright: as the cell around"
-            ));
-        }
-        notes
+        let below = text::any(below.len(), "cell", |cells| {
+            format!("not drawn: {cells} below level {}", self.depth)
+        });
+        let level = text::any(level, "cell", |cells| {
+            format!("{cells} bounded by a plane that is not upright: as the cell around")
+        });
+        ["thicker outlines: upper levels".to_owned(), below, level]
     }
 }
 

@@ -239,10 +239,8 @@ fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
     let name: String = slug(&words.join("-")).chars().take(200).collect();
     let is_free = |name: &String| taken.iter().all(|picture| picture.0 != *name);
     // Two worlds may look the same to a file system.
-    let mut names = (1..).map(|n| match n {
-        1 => name.clone(),
-        n => format!("{name}-{n}"),
-    });
+    let others = (2..).map(|n| format!("{name}-{n}"));
+    let mut names = [name.clone()].into_iter().chain(others);
     names.find(is_free).unwrap_or_default()
 }
 

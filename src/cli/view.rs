@@ -182,13 +182,11 @@ fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
         0 => "no visible item lost".to_owned(),
         count => format!("{} visible items lost", mean(count)),
     });
+    let count = data.structures.len();
     let structures = match (data.structures.as_slice(), agree) {
         ([one], _) => format!("The structure is {}.", one.name),
-        (all, true) => format!("All {} structures return the same sets.", all.len()),
-        (all, false) => {
-            let count = all.len();
-            format!("The {count} structures disagree; the sets are the first one's.")
-        }
+        (_, true) => format!("All {count} structures return the same sets."),
+        (_, false) => format!("The {count} structures disagree; the sets are the first one's."),
     };
     let (parts, returned) = (parts.join(", "), mean(returned));
     let (views, items) = (text::counted(views, "view"), text::count(data.items));
