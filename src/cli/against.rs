@@ -23,7 +23,7 @@ use super::{interrupt, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
 use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
-use crate::report::{Basis, Changes, ReportCell, WORK, changes};
+use crate::report::{Basis, Changes, ReportCell, WORK, changes, grouped};
 use crate::scene;
 use crate::statistics::resolved;
 
@@ -241,13 +241,9 @@ impl Duel<'_> {
     /// The changes of all cells by the parts of both sides.
     fn changes(&self, seen: &[Vec<Part>; 2]) -> Changes {
         let cells = seen.each_ref().map(|parts| -> Vec<ReportCell> {
-            let of_group = |key: GroupKey| -> Vec<Part> {
-                let own = parts.iter().filter(|part| part.key == key);
-                own.cloned().collect()
-            };
-            let groups = self.plan.groups().into_iter().map(of_group);
-            let groups = groups.filter(|parts| !parts.is_empty());
-            groups.flat_map(|parts| Group::of(&parts).cells).collect()
+            let groups = grouped(parts.iter().map(|part| (&part.key, part.clone())));
+            let groups = groups.iter().map(|(_, parts)| Group::of(parts));
+            groups.flat_map(|group| group.cells).collect()
         });
         let metrics = match self.args.gate {
             Gate::Time if self.plan.motions.is_empty() => &["query_ns"],

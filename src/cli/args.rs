@@ -129,7 +129,6 @@ pub enum ListTopic {
 
 #[derive(Args, Debug)]
 #[command(after_help = include_str!("assets/help/run.txt"))]
-#[command(mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct RunArgs {
     #[command(flatten)]
     pub what: WhatArgs,

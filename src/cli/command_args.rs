@@ -208,7 +208,6 @@ pub enum Gate {
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(include_str!("assets/help/compare.txt")))]
-#[command(mut_arg("motion", |arg| arg.conflicts_with("cold")))]
 pub struct CompareArgs {
     /// report.json of the older run, or the folder it is in; with --baseline NEW alone
     #[arg(value_name = "OLD.json", required_unless_present_any = ["against", "baseline"])]

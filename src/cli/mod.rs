@@ -175,18 +175,16 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
 
 /// Shows what the argument parser has to say: an error on one line, or the help.
 fn refused(error: &clap::Error) -> ExitCode {
-    let failed = |line: String| {
-        tell!("error: {line}");
-        ExitCode::from(2)
+    let line = match program::one_line(error) {
+        Some(line) => line,
+        None => match error.print().and_then(|()| io::stdout().flush()) {
+            Ok(()) => return ExitCode::from(u8::from(error.use_stderr()) * 2),
+            Err(unread) if is_broken_pipe(&unread) => return ExitCode::SUCCESS,
+            Err(full) => format!("{OUTPUT}{full}{}", expected_by(&full, "file")),
+        },
     };
-    if let Some(line) = program::one_line(error) {
-        return failed(line);
-    }
-    match error.print().and_then(|()| io::stdout().flush()) {
-        Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
-        Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
-        Err(full) => failed(format!("{OUTPUT}{full}{}", expected_by(&full, "file"))),
-    }
+    tell!("error: {line}");
+    ExitCode::from(2)
 }
 
 /// Runs a command.

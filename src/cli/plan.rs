@@ -68,7 +68,9 @@ impl Plan<'_> {
         let middle = middle.min / 2.0 + middle.max / 2.0;
         let eye = self.camera.map_or(middle, |c| c.frame.eye);
         let eye = up.to_z_up(eye);
-        let storey = self.camera.and_then(|camera| self.storey(camera));
+        // Lowest and highest z of the rooms at the height of the eye.
+        let heights = self.rooms().map(|(min, max)| [min.z, max.z]);
+        let storey = heights.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
         let (mut apart, mut all) = (0, Vec::new());
         for (item, b) in self.scene.items.iter().enumerate() {
             if b.is_empty() {
@@ -102,16 +104,9 @@ impl Plan<'_> {
         (drawn.collect(), notes.into())
     }
 
-    /// Lowest and highest z of the rooms at the height of the eye.
-    fn storey(&self, camera: &Camera) -> Option<[f64; 2]> {
-        let rooms = self.rooms(camera);
-        let heights = rooms.map(|(min, max)| [min.z, max.z]);
-        heights.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
-    }
-
-    /// Rooms at the height of the eye.
-    fn rooms(&self, camera: &Camera) -> impl Iterator<Item = (DVec3, DVec3)> {
-        let z = camera.frame.eye.z;
+    /// Rooms at the height of the eye; none without a camera.
+    fn rooms(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let z = self.camera.map_or(f64::NAN, |camera| camera.frame.eye.z);
         let rooms = match &self.scene.regions {
             Regions::Tiling(tiling) => &tiling.boxes[..],
             _ => &[],
@@ -145,8 +140,8 @@ impl Plan<'_> {
                 let [a, b] = line.ends.map(|end| sheet.at(end.map(f64::from).into()));
                 let _ = write!(path, "M{} {}L{} {}", a[0], a[1], b[0], b[1]);
             }
-        } else if let Some(camera) = self.camera {
-            for (min, max) in self.rooms(camera) {
+        } else {
+            for (min, max) in self.rooms() {
                 sheet.push_rect([min.truncate(), max.truncate()], &mut path);
             }
         }

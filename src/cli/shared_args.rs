@@ -73,7 +73,7 @@ pub struct WhatArgs {
     #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
     /// Measure with cold caches as well (always on in the suite full)
-    #[arg(long)]
+    #[arg(long, conflicts_with = "motion")]
     pub cold: bool,
     /// Do not measure the lower bounds: reading all items, copying all answers
     #[arg(long)]

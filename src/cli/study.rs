@@ -50,9 +50,7 @@ pub fn tell_progress(bar: &ProgressBar, parts: &str, told: &mut Instant) {
         let (done, all) = (bar.position(), bar.length().unwrap_or(0));
         let left = all.saturating_sub(done) as f64 / done.max(1) as f64;
         let left = HumanDuration(bar.elapsed().mul_f64(left));
-        tell(&format!(
-            "at work: {done} of {all} {parts} done, {left:#} left"
-        ));
+        tell!("at work: {done} of {all} {parts} done, {left:#} left");
     }
 }
 
