@@ -22,11 +22,10 @@ use crate::suite::SUITES;
 const COLUMNS: &str = "kind origin capabilities timed params licence state unit";
 
 pub fn list(registry: &Registry, one: Option<ListTopic>, format: TableFormat) -> Result<Ending> {
-    let topics = ListTopic::value_variants().to_vec();
-    let topics = one.map_or(topics, |topic| vec![topic]);
+    let topics = ListTopic::value_variants().iter().copied();
     let mut out = io::stdout().lock();
     let mut all = Map::new();
-    for topic in topics {
+    for topic in topics.filter(|topic| one.is_none_or(|one| one == *topic)) {
         let (name, note, rows) = rows(registry, topic)?;
         if format == TableFormat::Json {
             all.insert(name.to_owned(), rows.into());

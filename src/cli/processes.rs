@@ -205,10 +205,8 @@ impl Workers {
     pub fn new(args: Vec<String>, patience: Duration, folder: &Path) -> anyhow::Result<Workers> {
         let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
         for (source, bytes) in input::pipes() {
-            let kept = temporary_in(folder).and_then(|mut file| {
-                file.write_all(&bytes)?;
-                Ok(file)
-            });
+            let write = |mut file: NamedTempFile| file.write_all(&bytes).map(|()| file);
+            let kept = temporary_in(folder).and_then(write);
             let place = || format!("{source}: cannot be copied for the processes to read");
             let file = kept.map_err(input::bare).with_context(place)?;
             spooled.insert(source, std::path::absolute(file.path())?);
@@ -364,10 +362,8 @@ fn own_program() -> anyhow::Result<PathBuf> {
         let file = |path: &Path| path.metadata().ok().map(|file| (file.dev(), file.ino()));
         let held = file(&running);
         // Under an emulator, such as valgrind, what runs is another program than the named.
-        let is_emulated = named
-            .as_ref()
-            .is_ok_and(|own| own.exists() && file(own) != held);
-        if held.is_some() && !is_emulated {
+        let is_other = |own: &PathBuf| own.exists() && file(own) != held;
+        if held.is_some() && !named.as_ref().is_ok_and(is_other) {
             return Ok(running);
         }
     }

@@ -190,7 +190,7 @@ impl<'a> Run<'a> {
                     }
                     // Not any structure's doing, as far as one can tell.
                     Ended::Died(_, verdict) => {
-                        self.fail_all(&planned.source, &failed, &keys, process, &verdict)?;
+                        self.fail_all(&failed, &keys, process, &verdict)?;
                         break;
                     }
                 }
@@ -238,7 +238,6 @@ impl<'a> Run<'a> {
     /// Every cell of what is still wanted gets this verdict.
     fn fail_all(
         &mut self,
-        scene: &str,
         failed: &BTreeMap<String, Verdict>,
         keys: &[GroupKey],
         process: u32,
@@ -255,7 +254,7 @@ impl<'a> Run<'a> {
             let before = before.first().map(|kept| &kept.part);
             let structures = self.plan.structures.iter();
             let subjects = structures.map(|spec| SubjectPart::unknown(spec, verdict.clone()));
-            let unknown = || SceneInfo::unknown(scene);
+            let unknown = || SceneInfo::unknown(&key.scene);
             let part = Part {
                 key: key.clone(),
                 process,

@@ -120,8 +120,7 @@ fn ns_per_test(cell: &ReportCell) -> Option<f64> {
 }
 
 fn of_one(pair: &Pair) -> Table {
-    let names = [pair.own, pair.other].map(|cell| shortened(&cell.structure, 24));
-    let [own, other] = names;
+    let [own, other] = [pair.own, pair.other].map(|cell| shortened(&cell.structure, 24));
     let mut table = Table::of_numbers(["per query", &own, &other, "ratio"]);
     let mut row = |name: &str, of: &dyn Fn(&ReportCell) -> Option<f64>, show: fn(f64) -> String| {
         let [own, other] = [pair.own, pair.other].map(|cell| some(of(cell), show));

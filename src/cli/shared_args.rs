@@ -141,11 +141,9 @@ fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSp
     let mut policies: Vec<UpdatePolicy> = Vec::new();
     for text in list.split(',').map(str::trim) {
         let policy = text.parse()?;
-        let is_new = !policies.contains(&policy);
-        ensure!(
-            is_new,
-            "--update '{text}' is named twice; expected each once"
-        );
+        if policies.contains(&policy) {
+            bail!("--update '{text}' is named twice; expected each once");
+        }
         policies.push(policy);
     }
     let mut all: Vec<StructureSpec> = Vec::new();
@@ -304,11 +302,10 @@ pub struct LensArgs {
 
 impl LensArgs {
     pub fn defaults(&self) -> Result<LensDefaults> {
-        if let (Some(near), Some(far)) = (self.near, self.far) {
-            ensure!(
-                near < far,
-                "--near is {near} and --far {far}; expected near < far"
-            );
+        if let (Some(near), Some(far)) = (self.near, self.far)
+            && near >= far
+        {
+            bail!("--near is {near} and --far {far}; expected near < far");
         }
         Ok(LensDefaults {
             matrix: self.matrix_convention,
