@@ -143,13 +143,11 @@ fn setting(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> R
 fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'s>> {
     let (study, views) = (&args.study, (args.frames as usize, args.samples));
     let chain = chain(args, &setting.scene, &setting.structures)?;
+    let is_table = args.format == TableFormat::Table && args.html.is_none() && args.csv.is_none();
     Ok(FunnelInput {
         cut_outs: args.cut_out.as_ref(),
         inner_boxes: args.inner_boxes.map(|most| most as usize),
-        all: args.all
-            || args.html.is_some()
-            || args.csv.is_some()
-            || args.format != TableFormat::Table,
+        all: args.all || !is_table,
         picks: !args.no_picks,
         loading: study.lens.scene_args.options(0),
         ..FunnelInput::new(setting, chain, views, study.kernel.execution()?)

@@ -109,9 +109,7 @@ impl Worker {
             }
         };
         self.waited = Duration::ZERO;
-        let told = str::from_utf8(&line).ok();
-        let message = told.and_then(|line| serde_json::from_str(line).ok());
-        let message = message.ok_or_else(|| {
+        let message = serde_json::from_slice(&line).map_err(|_| {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
             // A worker that has told what it does speaks the protocol.

@@ -199,8 +199,9 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     against(&caption, 1e-4, points)
 }
 
-/// A structure, and its time and error at the level of a test; large if it is on the
-/// front, a cross if it misses something that is to be found.
+/// A structure, and its time and error at the level of a test.
+///
+/// Large if it is on the front, a cross if it misses something that is to be found.
 pub type Measured = (String, Point);
 
 /// Points of the front that are better the longer they take.
