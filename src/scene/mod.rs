@@ -53,6 +53,7 @@ pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 #[cfg(feature = "cli")]
 pub(crate) use memory::available_bytes;
+#[cfg(feature = "cli")]
 pub(crate) use meshes::ground::Shape;
 pub use obj::read_obj;
 pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_AXES, UpAxis};
