@@ -50,15 +50,6 @@ impl Ray {
     pub fn at(&self, depth: f64) -> DVec3 {
         self.origin + self.direction * depth
     }
-
-    /// Returns `true` if a depth between two bounds is from near to far.
-    ///
-    /// Compares the depth with another by `compare` where the bounds leave it open.
-    #[inline(always)]
-    pub fn reaches(&self, [least, most]: [f64; 2], compare: impl Fn(f64) -> Ordering) -> bool {
-        let is_before = least < self.near && compare(self.near).is_lt();
-        !(is_before || most > self.far && compare(self.far).is_gt())
-    }
 }
 
 /// All rays of a camera.

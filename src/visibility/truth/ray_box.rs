@@ -142,9 +142,13 @@ impl Probe {
         if enters_to > leaves_from && self.leaves_before(b, &enters) {
             return None;
         }
-        let compare = |depth| self.compare_with(&enters, depth);
-        let is_seen = ray.reaches([enters_from, enters_to], compare);
-        is_seen.then_some(enters)
+        if enters_from < ray.near && self.compare_with(&enters, ray.near).is_lt() {
+            return None;
+        }
+        if enters_to > ray.far && self.compare_with(&enters, ray.far).is_gt() {
+            return None;
+        }
+        Some(enters)
     }
 
     /// The bound of a box that the ray crosses first along an axis it moves along.
@@ -195,8 +199,11 @@ impl Probe {
         }
     }
 
-    /// A crossing against a finite depth, exactly.
+    /// A crossing against a depth, exactly.
     fn compare_with(&self, a: &Crossing, depth: f64) -> Ordering {
+        if depth.is_infinite() {
+            return 0.0_f64.total_cmp(&depth);
+        }
         let d = self.ray.direction[a.axis];
         let difference = &self.numerator(a) - &Expansion::product(depth, d);
         let order = difference.sign().cmp(&0);

@@ -160,12 +160,18 @@ impl TriangleProbe {
             error,
             corners,
         };
-        let bounds @ [least, most] = [meeting.at_least(), Self::at_most(&meeting)];
-        if least > limit || least > self.ray.far || most < self.ray.near {
+        let (near, far) = (self.ray.near, self.ray.far);
+        if meeting.at_least() > limit || meeting.at_least() > far || Self::at_most(&meeting) < near
+        {
             return None;
         }
-        let compare = |depth| self.compare_with(&meeting, depth);
-        self.ray.reaches(bounds, compare).then_some(meeting)
+        if meeting.at_least() < near && self.compare_with(&meeting, near).is_lt() {
+            return None;
+        }
+        if Self::at_most(&meeting) > far && self.compare_with(&meeting, far).is_gt() {
+            return None;
+        }
+        Some(meeting)
     }
 
     #[cold]
@@ -176,9 +182,12 @@ impl TriangleProbe {
         difference.sign().cmp(&0)
     }
 
-    /// A meeting against a finite depth, exactly.
+    /// A meeting against a depth, exactly.
     #[cold]
     fn compare_with(&self, a: &Meeting, depth: f64) -> Ordering {
+        if depth.is_infinite() {
+            return 0.0_f64.total_cmp(&depth);
+        }
         let (above, below) = self.fraction(a.corners);
         let difference = &above - &(&below * &Expansion::from(depth));
         difference.sign().cmp(&0)
