@@ -93,8 +93,10 @@ impl Rows {
 fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let is_centre = |name: &String| {
-        let name = name.to_lowercase();
-        name.starts_with("cent") && name.ends_with('x')
+        let letters = name
+            .to_lowercase()
+            .replace(|c: char| !c.is_alphanumeric(), "");
+        ["centerx", "centrex", "centroidx"].contains(&&letters[..])
     };
     if table.column(BOUNDS[0]).is_none() && table.header.iter().any(is_centre) {
         let half = "min = centre - half the size, max = centre + half the size";
