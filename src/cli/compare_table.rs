@@ -175,8 +175,12 @@ impl CompareTable<'_> {
         }
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
-        if self.args.gate == Gate::Time && changes.only_in_old.len() + changes.only_in_new.len() > 0
-        {
+        let mut lone = changes.only_in_old.iter().chain(&changes.only_in_new);
+        let is_company = |cell: &Lone| {
+            let mut rows = changes.rows.iter();
+            rows.any(|row| row.cell.group == cell.cell.group)
+        };
+        if self.args.gate == Gate::Time && lone.any(is_company) {
             let other = "beside other structures, those in both may take other times";
             lines.push(other.to_owned());
         }

@@ -448,6 +448,7 @@ fn cells_of_one_side_and_other_settings_are_said() {
     for wanted in [
         "only in OLD: 1 cell (bvh on uniform:n=300, orbit:frames=8, six-plane)",
         "only in NEW: 1 cell (bvh:leaf=2 on",
+        "beside other structures, those in both may take other times",
         "note: machine differs: cpu '",
         "note: different machines:",
         "note: toolchain differs: flags '' and '-C target-cpu=native'",
