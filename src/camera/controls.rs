@@ -32,7 +32,7 @@ impl Frame {
     /// camera.roll(30.0);
     /// camera.yaw(40.0);
     /// camera.pitch(20.0);
-    /// assert_eq!(camera.eye(), DVec3::new(-1.0, 0.0, -2.0));
+    /// assert_eq!(camera.eye, DVec3::new(-1.0, 0.0, -2.0));
     /// # Ok::<(), cullbench::camera::CameraError>(())
     /// ```
     pub fn slide(&mut self, du: f64, dv: f64, dn: f64) {
