@@ -298,6 +298,23 @@ mod tests {
         assert_eq!((timed.samples.len(), timed.samples[0].queries), (3, 40));
     }
 
+    /// Forty cameras of 20 ns, seven times, are more than the least lap.
+    #[test]
+    fn short_queries_of_few_cameras_are_repeated() {
+        for is_batched in [false, true] {
+            let many = || Box::new(|cameras: &[u32]| cameras.len() as u64) as _;
+            let short = TimedTask {
+                least_ns: Some(20.0),
+                ask_many: is_batched.then(many),
+                ..task(|_| 1, vec![1; 40])
+            };
+            let timed = timed_rounds(&[short], &protocol()).remove(0).unwrap();
+            let sample = &timed.samples[0];
+            assert_eq!((sample.queries, sample.returned), (280, 280));
+            assert_eq!(timed.samples.len(), 3);
+        }
+    }
+
     #[test]
     fn a_lap_loses_the_time_of_the_clock_and_never_all() {
         let of = |cpu_ns| Lap {
