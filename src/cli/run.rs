@@ -1,6 +1,6 @@
-//! `cullbench run`, the main job: plan, measure scene by scene in processes of
-//! its own, keep every finished part on disk, show the conclusion. `cullbench merge`:
-//! the shards of a plan become one run.
+//! `cullbench run`, the main job: plan, measure in processes of its own, keep every
+//! finished part on disk, show the conclusion. `cullbench merge`: the shards of a plan
+//! become one run.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -119,8 +119,12 @@ impl<'a> Run<'a> {
 
     /// Measures all scenes; keeps a finished run as the baseline that the options name.
     fn all(mut self) -> Result<Ending> {
-        let mut scenes = 0..self.plan.scenes.len();
-        let measured = scenes.try_for_each(|scene| self.scene(scene));
+        // The processes of a scene are spread over the run: another program that takes the
+        // caches for some seconds meets one process of every scene, not all of one.
+        let scenes = 0..self.plan.scenes.len();
+        let processes = 0..self.plan.effort.processes;
+        let mut all = processes.flat_map(|process| scenes.clone().map(move |s| (s, process)));
+        let measured = all.try_for_each(|(scene, process)| self.process(scene, process));
         self.bar.finish_and_clear();
         let stopped = measured.is_err();
         // After an error what was measured stays, and no empty folder.
@@ -167,36 +171,32 @@ impl<'a> Run<'a> {
         Ok(Ending::of(!report.has_failed()))
     }
 
-    /// All processes of a scene.
-    fn scene(&mut self, scene: usize) -> Result<()> {
+    /// One process of a scene, and others in place of those that a structure ends.
+    fn process(&mut self, scene: usize, process: u32) -> Result<()> {
         let planned = self.plan.scenes[scene].clone();
         let keys = self.plan.keys_of(&planned);
-        // Structures that have ended a process on this scene, if the run was begun before.
+        // Structures that have ended a process on this scene.
         let before = self.stream.parts.iter().map(|kept| &kept.part);
         let before = before.filter(|part| part.key.scene == planned.source);
         let mut failed: BTreeMap<_, _> = before.flat_map(|part| part.failed.clone()).collect();
-        for process in 0..self.plan.effort.processes {
-            loop {
-                interrupt::check()?;
-                let share = self.share(&keys, process, &failed);
-                if !share.wanted.contains(&true) {
-                    break;
+        loop {
+            interrupt::check()?;
+            let share = self.share(&keys, process, &failed);
+            if !share.wanted.contains(&true) {
+                return Ok(());
+            }
+            match self.worker(scene, share)? {
+                Ended::Done => return Ok(()),
+                Ended::Failed(reason) => bail!("{reason}"),
+                Ended::Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
+                    failed.insert(structure, verdict);
                 }
-                match self.worker(scene, share)? {
-                    Ended::Done => break,
-                    Ended::Failed(reason) => bail!("{reason}"),
-                    Ended::Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
-                        failed.insert(structure, verdict);
-                    }
-                    // Not any structure's doing, as far as one can tell.
-                    Ended::Died(_, verdict) => {
-                        self.fail_all(&failed, &keys, process, &verdict)?;
-                        break;
-                    }
+                // Not any structure's doing, as far as one can tell.
+                Ended::Died(_, verdict) => {
+                    return self.fail_all(&failed, &keys, process, &verdict);
                 }
             }
         }
-        Ok(())
     }
 
     fn share(&self, keys: &[GroupKey], process: u32, failed: &BTreeMap<String, Verdict>) -> Share {

@@ -227,8 +227,10 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     let centred: Vec<Logs> = timed.iter().map(|(_, logs)| centred(logs)).collect();
     let relative = (0..timed.len()).map(|own| relative(own, &timed, &centred));
     let (was, is): (Vec<_>, Vec<_>) = relative.map(<(_, _)>::from).unzip();
-    let structures = timed.iter().map(|(row, _)| row.cell.structure.as_str());
-    let judged = judge_unpaired(&was, &is, &structures.collect::<Vec<_>>(), threshold);
+    let names = timed
+        .iter()
+        .map(|(row, _)| (row.cell.structure.as_str(), row.cell.group.id()));
+    let judged = judge_unpaired(&was, &is, &names.collect::<Vec<_>>(), threshold);
     for ((row, _), judgement) in timed.into_iter().zip(judged) {
         row.reason = why_inconclusive(judgement.is_some(), row.processes);
         conclude(row, judgement);
@@ -350,7 +352,7 @@ fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
         };
         (0..counts[side]).map(process).collect()
     };
-    let found = judge_unpaired(&[of(0)], &[of(1)], &["all"], 0.0)[0]?;
+    let found = judge_unpaired(&[of(0)], &[of(1)], &[((), ())], 0.0)[0]?;
     Some(CommonShift {
         metric,
         ratio: found.ratio,

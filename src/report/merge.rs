@@ -78,12 +78,12 @@ pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, Inp
             return Err(writing::at(&file, why));
         }
     }
-    // The order of one run: scene by scene, process by process.
+    // The order of one run: process by process, scene by scene.
     let place = |key: &GroupKey| whole.iter().position(|other| other == key);
     let scene = |key: &GroupKey| whole.iter().position(|other| other.scene == key.scene);
     parts.sort_by_key(|(kept, _)| {
         let part = &kept.part;
-        (scene(&part.key), part.process, place(&part.key))
+        (part.process, scene(&part.key), place(&part.key))
     });
     let mut samples_end = SAMPLE_COLUMNS.len() as u64;
     let kept = parts.into_iter().map(|(part, samples)| {

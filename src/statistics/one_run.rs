@@ -146,7 +146,7 @@ fn margin(values: &[f64]) -> f64 {
 /// does; with a degree of freedom fewer 95.6 % (10) and 94 % (12 to 20), but wide
 /// below eight: 99 % (5). Differences of pairs in turns have one heap, and keep
 /// Yuen's: 94 to 95 %.
-fn estimate(values: &[f64]) -> Option<Trimmed> {
+pub(super) fn estimate(values: &[f64]) -> Option<Trimmed> {
     let mut found = trimmed_mean(values)?;
     let count = values.len() as f64;
     let plain = (squares(values) / (count * (count - 1.0))).sqrt();

@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::judgement::judge_estimates;
+use super::one_run::estimate;
 use super::trimmed::{centre, difference};
-use super::{Judgement, Trimmed, median, trimmed_mean};
+use super::{Judgement, Trimmed, median};
 
 /// Changes of up to 5 % between two runs are not called one: single cells of
 /// one program moved by 9 % from one quiet run to the next.
 const FLOOR_OF_RUNS: f64 = 0.05;
 
 /// Fewer cells do not tell how far two runs scatter: of all cells, and of those of
-/// one structure.
+/// one structure or group.
 const LEAST_CELLS: usize = 8;
 const LEAST_OF_ONE: usize = 4;
 /// Standard deviation / median absolute deviation, of a normal distribution.
@@ -22,33 +23,40 @@ const SD_PER_MAD: f64 = 1.4826;
 /// may differ.
 ///
 /// The estimate is the difference of two 20 % trimmed means with the standard
-/// error and degrees of freedom of Yuen and Welch. Two runs of one program differ by
-/// more than their processes do: other load, other hours. How much more, the cells
-/// themselves tell: their scatter beyond their standard errors, over all of them, or
-/// over those of one structure about their own middle if that is more, is added to
-/// their variances (an empirical null: Efron 2004, "Large-scale simultaneous
+/// error and degrees of freedom of Yuen and Welch, or those of the plain means where they
+/// scatter more. Two runs of one program differ by more than their processes do: other
+/// load, other hours. How much more, the cells themselves tell: their scatter beyond their
+/// standard errors, over all of them, over those of one structure about their own middle,
+/// or over those of one group (scene and path), whichever is most, is added to their
+/// variances (an empirical null: Efron 2004, "Large-scale simultaneous
 /// hypothesis testing"). Then the rules of [`judge`](super::judge), but that slower
-/// and faster mean a change that is proven to be over 5 %. A cell with under three processes on a side is
+/// and faster mean a change that is proven to be over 5 %, and that no cell's variance is
+/// lowered for what the others have: a tree that fills the cache scatters ten times as
+/// much as a small one. A cell with under three processes on a side is
 /// inconclusive, with a ratio but without interval, and is no test that Holm's
 /// correction counts. `None` for a cell with an empty side, or a value that is
 /// not finite. Cells that only one of the two reports has are left out.
-/// `structures` names the structure of each cell.
-pub fn judge_unpaired(
+/// `names` has structure and group of each cell.
+pub fn judge_unpaired<S: Ord, G: Ord>(
     old: &[Vec<f64>],
     new: &[Vec<f64>],
-    structures: &[&str],
+    names: &[(S, G)],
     threshold: f64,
 ) -> Vec<Option<Judgement>> {
     let sides = || old.iter().zip(new);
-    let estimate = |(old, new): (&Vec<f64>, &Vec<f64>)| {
-        Some(difference(&trimmed_mean(old)?, &trimmed_mean(new)?))
-    };
-    let estimates: Vec<Option<Trimmed>> = sides().map(estimate).collect();
-    let names = estimates.iter().zip(structures);
-    let names = names.filter_map(|(found, name)| found.map(|_| *name));
-    let names: Vec<&str> = names.collect();
+    let changed =
+        |(old, new): (&Vec<f64>, &Vec<f64>)| Some(difference(&estimate(old)?, &estimate(new)?));
+    let estimates: Vec<Option<Trimmed>> = sides().map(changed).collect();
+    let known = estimates.iter().zip(names);
+    let known = known.filter_map(|(found, names)| Some(((*found)?, names)));
+    let (own, names): (Vec<Trimmed>, Vec<&(S, G)>) = known.unzip();
     // More processes leave the scatter of the runs as it is.
     let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
+        for (cell, own) in cells.iter_mut().zip(own) {
+            if own.standard_error > cell.standard_error {
+                *cell = own;
+            }
+        }
         add_scatter_of_runs(cells, &names)
     });
     let judged = sides().zip(judged);
@@ -57,22 +65,40 @@ pub fn judge_unpaired(
 }
 
 /// Adds the scatter of the runs; the standard deviation that each cell got.
-fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) -> Vec<f64> {
-    let mut of_structure: BTreeMap<&str, Vec<Trimmed>> = BTreeMap::new();
-    for (cell, &structure) in cells.iter().zip(structures) {
-        of_structure.entry(structure).or_default().push(*cell);
-    }
+fn add_scatter_of_runs<S: Ord, G: Ord>(cells: &mut [Trimmed], names: &[&(S, G)]) -> Vec<f64> {
     // Relative to the others of its group a cell is expected not to move.
     let of_all = excess_variance(cells, 0.0, LEAST_CELLS);
-    let added = cells.iter_mut().zip(structures).map(|(cell, structure)| {
-        let own = &of_structure[structure];
-        let middle = median(&own.iter().map(|cell| cell.mean).collect::<Vec<_>>());
-        let of_own = excess_variance(own, middle.unwrap_or_default(), LEAST_OF_ONE);
-        let scatter = of_all.max(of_own).sqrt();
-        cell.standard_error = cell.standard_error.hypot(scatter);
-        scatter
+    let of_structure = scatter_within(cells, names.iter().map(|names| &names.0), |cells| {
+        median(&cells.iter().map(|cell| cell.mean).collect::<Vec<_>>()).unwrap_or_default()
     });
+    let of_group = scatter_within(cells, names.iter().map(|names| &names.1), |_| 0.0);
+    let added = cells
+        .iter_mut()
+        .zip(names)
+        .map(|(cell, (structure, group))| {
+            let own = of_structure[structure].max(of_group[group]);
+            let scatter = of_all.max(own).sqrt();
+            cell.standard_error = cell.standard_error.hypot(scatter);
+            scatter
+        });
     added.collect()
+}
+
+/// [`excess_variance`] among the cells of each name about their `middle`.
+fn scatter_within<'n, N: Ord>(
+    cells: &[Trimmed],
+    names: impl Iterator<Item = &'n N>,
+    middle: impl Fn(&[Trimmed]) -> f64,
+) -> BTreeMap<&'n N, f64> {
+    let mut alike: BTreeMap<&N, Vec<Trimmed>> = BTreeMap::new();
+    for (name, cell) in names.zip(cells) {
+        alike.entry(name).or_default().push(*cell);
+    }
+    let scatter = |cells: Vec<Trimmed>| excess_variance(&cells, middle(&cells), LEAST_OF_ONE);
+    alike
+        .into_iter()
+        .map(|(name, cells)| (name, scatter(cells)))
+        .collect()
 }
 
 /// Variance of the means about `middle` beyond their standard errors, by the median
@@ -107,19 +133,18 @@ mod tests {
 
     #[test]
     fn reports_are_judged_by_welch() {
-        let found = judge_unpaired(&[side(1.0)], &[side(1.1)], &["a"], 0.05)[0].unwrap();
+        let found = judge_unpaired(&[side(1.0)], &[side(1.1)], &[("a", 0)], 0.05)[0].unwrap();
         assert_eq!((found.change, found.pairs), (Change::Slower, 10));
-        // se = sqrt(2) * 0.01190238, df = 10: t = 2.228139.
-        let margin = 2.228_139 * 0.011_902_38 * 2f64.sqrt();
+        // se = sqrt(2) * 0.01190238, above that of plain means, df = 8: t = 2.306004.
+        let margin = 2.306_004 * 0.011_902_38 * 2f64.sqrt();
         assert!((found.lower.unwrap().ln() - (0.1 - margin)).abs() < 1e-7);
-        let found = judge_unpaired(&[side(1.1)], &[side(1.0)], &["a"], 0.05)[0].unwrap();
+        let found = judge_unpaired(&[side(1.1)], &[side(1.0)], &[("a", 0)], 0.05)[0].unwrap();
         assert_eq!(found.change, Change::Faster);
     }
 
     /// Ten structures in four scenes each, all of which moved by what `of` says.
     fn judged(of: impl Fn(usize, usize) -> f64) -> Vec<Judgement> {
-        let names: Vec<String> = (0..40).map(|cell| format!("s{}", cell / 4)).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let names: Vec<(usize, usize)> = (0..40).map(|cell| (cell / 4, cell % 4)).collect();
         let old = vec![side(0.0); 40];
         let new: Vec<Vec<f64>> = (0..40).map(|cell| side(of(cell / 4, cell % 4))).collect();
         let found = judge_unpaired(&old, &new, &names, 0.05);
@@ -142,7 +167,7 @@ mod tests {
         assert_eq!(slower(&wild), 0);
         // As many processes as one likes leave it as it is.
         assert!(wild.iter().all(|found| found.more_pairs.is_none()));
-        let unclear = judge_unpaired(&[side(0.0)], &[side(0.06)], &["a"], 0.05)[0].unwrap();
+        let unclear = judge_unpaired(&[side(0.0)], &[side(0.06)], &[("a", 0)], 0.05)[0].unwrap();
         assert!(unclear.more_pairs.is_some());
         // One structure alone that scatters is found by its own cells.
         let one = judged(|structure, scene| match (structure, scene) {
@@ -151,13 +176,36 @@ mod tests {
             _ => 0.0,
         });
         assert_eq!(slower(&one), 0);
+        // Nor do the cells of a scene that others on the machine have disturbed.
+        let disturbed = judged(|structure, scene| match (scene, structure % 2) {
+            (1, 0) => 0.3,
+            (1, _) => -0.3,
+            _ => 0.0,
+        });
+        assert_eq!(slower(&disturbed), 0);
+    }
+
+    /// Quiet cells say nothing of the one beside them.
+    #[test]
+    fn a_restless_cell_keeps_its_variance() {
+        let restless = |centre: f64| -> Vec<f64> {
+            let scatter = |i: i32| centre + 0.1 * (f64::from(i) - 4.5);
+            (0..10).map(scatter).collect()
+        };
+        let names: Vec<(usize, usize)> = (0..40).map(|cell| (cell, cell)).collect();
+        let [mut old, mut new] = [vec![side(0.0); 40], vec![side(0.0); 40]];
+        (old[0], new[0]) = (restless(0.0), restless(0.45));
+        let alone = judge_unpaired(&old[..1], &new[..1], &names[..1], 0.05)[0].unwrap();
+        let among = judge_unpaired(&old, &new, &names, 0.05)[0].unwrap();
+        assert_eq!(among.lower, alone.lower);
+        assert_eq!(among.change, Change::Inconclusive);
     }
 
     #[test]
     fn one_process_per_side_is_inconclusive() {
         let old = [vec![0.0], side(0.0), vec![]];
         let new = [vec![2f64.ln()], side(0.0), side(0.0)];
-        let found = judge_unpaired(&old, &new, &["a", "b", "c"], 0.1);
+        let found = judge_unpaired(&old, &new, &[("a", 0), ("b", 0), ("c", 0)], 0.1);
         let lone = found[0].unwrap();
         assert_eq!((lone.change, lone.lower), (Change::Inconclusive, None));
         assert!((lone.ratio - 2.0).abs() < 1e-12);
