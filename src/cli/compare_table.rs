@@ -15,7 +15,7 @@ use crate::report::{
     Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Lone, Outcome, Setting, WORK, WorkChange,
     grouped, unique,
 };
-use crate::statistics::{Change, Judgement};
+use crate::statistics::{Change, Judgement, median};
 
 /// Counters in the list; `--all` shows every one.
 const LISTED: usize = 20;
@@ -131,6 +131,22 @@ impl CompareTable<'_> {
         print_json(&document)
     }
 
+    /// The change that half of the cells would show, for the line on the threshold.
+    fn resolves(&self) -> String {
+        let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
+        let found = median(
+            &judged
+                .filter_map(|found| found.resolution)
+                .collect::<Vec<_>>(),
+        );
+        text::some(found, |share| {
+            format!(
+                "; finds changes from about {} %",
+                text::significant(share * 100.0)
+            )
+        })
+    }
+
     fn head(&self) -> &str {
         match self.args.gate {
             Gate::Time => &self.head,
@@ -145,7 +161,7 @@ impl CompareTable<'_> {
         let mut lines = vec![
             format!("OLD  {}", self.old.line),
             format!("NEW  {}", self.new.line),
-            format!("{head}, threshold {threshold} %"),
+            format!("{head}, threshold {threshold} %{}", self.resolves()),
         ];
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         lines.extend(changes.common_shifts.iter().map(shift_line));
@@ -386,10 +402,12 @@ fn shift_line(shift: &CommonShift) -> String {
     });
     let (metric, ratio) = (shift.metric, percent(shift.ratio));
     let cells = text::counted(shift.cells, "cell");
-    format!(
-        "the machine or the program as a whole: {metric} of NEW is {ratio} %{interval} of OLD \
-         ({cells}); this comparison cannot tell which"
-    )
+    let is_open = shift.lower <= Some(1.0) && shift.upper >= Some(1.0);
+    let why = match is_open {
+        true => "",
+        false => "; this comparison cannot tell the machine from the program",
+    };
+    format!("as a whole {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}")
 }
 
 /// "work changed: bvh on city, ...: items_tested 1200 to 1111 (-7.4 %)".

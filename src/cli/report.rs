@@ -157,6 +157,9 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
             blocks.extend([heading, Block::Heat(table), legend]);
         }
     }
+    let warnings = report.input_warnings().into_iter();
+    let warnings = warnings.chain(report.noise.warnings.iter().map(String::as_str));
+    blocks.extend(warnings.map(|said| Block::Line(format!("Warning: {said}"))));
     blocks.extend(details(&all, views));
     let every: Vec<&Comparison> = all.iter().collect();
     blocks.extend(run_table::choices(&every).into_iter().map(Block::Line));
@@ -220,8 +223,6 @@ fn about(report: &Report) -> Vec<String> {
     let mut lines = vec![format!("{start}, suite: {suite}, seed {seed}{unfinished}.")];
     lines.extend(origin(&run.command, machine, &report.toolchain, source));
     lines.push(format!("{}.", text::conclusion(report)));
-    lines.extend(report.noise.warnings.iter().cloned());
-    lines.extend(report.input_warnings().into_iter().map(str::to_owned));
     lines
 }
 

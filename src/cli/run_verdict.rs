@@ -48,7 +48,7 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
         ));
     }
     if let [one] = all {
-        told.extend(repaid(one, base));
+        told.extend(repaid(one, base).filter(|_| !is_blind(one)));
         told.extend(gains(&SharedWork::of(one.sound())));
     }
     told.extend(checked(all));
@@ -90,6 +90,11 @@ pub fn gains(shared: &[SharedWork]) -> Option<String> {
     (!told.is_empty()).then(|| format!("{ranked} {}.", told.join(", ")))
 }
 
+/// Returns true if the fastest of empty answers is no advice.
+fn is_blind(comparison: &Comparison) -> bool {
+    comparison.of_any("visible_count") == Some(0.0)
+}
+
 fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     let winners: Vec<&ReportCell> = comparison.winners().collect();
     let Some(best) = winners.first() else {
@@ -101,6 +106,9 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         };
         return format!("Nothing is ranked: {why}.");
     };
+    if is_blind(comparison) {
+        return "Nothing is to be taken: no camera sees an item (see the warnings).".to_owned();
+    }
     let next = comparison.sound().nth(winners.len());
     // Noise alone may tie the fastest with what is slower than the next best.
     let is_ahead =

@@ -352,7 +352,19 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             .as_str()
             .is_some_and(|text| told.contains(&text[..20]))
     );
-    assert!(file("report.html").contains("y is up in 1 of 1 camera"));
+    let page = file("report.html");
+    let warned = page.find("Warning: y_up.csv: y is up in 1 of 1 camera");
+    assert!(warned.is_some() && warned < page.find("Machine and command"));
+    // The fastest of empty answers is no advice.
+    let run = "run --scene z.csv --path away.csv --structure linear,bvh --processes 2 --out away";
+    let done = cullbench(folder.path(), run);
+    let is_advised = done.out.contains("Take ") || done.out.contains("repaid after ");
+    assert!(
+        done.out
+            .contains("Nothing is to be taken: no camera sees an item")
+            && !is_advised,
+        "{done:?}"
+    );
 }
 
 #[test]
