@@ -6,6 +6,7 @@
 use std::array;
 use std::collections::{BTreeSet, HashMap};
 use std::iter::successors;
+use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3, DVec4};
 use gltf::json::Value;
@@ -49,8 +50,11 @@ pub type Parts = [Option<DVec4>; 3];
 struct Motion {
     still: DAffine3,
     parts: Parts,
-    tracks: [Option<Track>; 3],
+    tracks: [Option<Arc<Track>>; 3],
 }
+
+/// Tracks by their input, output, width and interpolation: many channels may name one.
+type Tracks = HashMap<[usize; 4], Arc<Track>>;
 
 #[derive(Clone, Debug)]
 struct Track {
@@ -175,13 +179,14 @@ impl File<'_> {
         nodes.reverse();
         let own = nodes.iter().filter_map(|node| channels.get(node)).flatten();
         let clips: BTreeSet<usize> = own.map(|(clip, ..)| *clip).collect();
-        let (mut chain, mut seconds) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
+        let (mut chain, mut known) = (Vec::new(), Tracks::new());
+        let mut seconds = [f64::INFINITY, f64::NEG_INFINITY];
         for index in nodes {
             let mut tracks = [None, None, None];
             let own = channels.get(&index).into_iter().flatten();
             for &(clip, number, part, channel) in own.filter(|own| clips.first() == Some(&own.0)) {
                 let place = format!("animations[{clip}].channels[{number}]");
-                let track = self.track(clip, channel, part, &place)?;
+                let track = self.track(clip, channel, part, &place, &mut known)?;
                 seconds[0] = seconds[0].min(track.times[0]);
                 seconds[1] = seconds[1].max(track.times[track.times.len() - 1]);
                 tracks[part] = Some(track);
@@ -201,18 +206,30 @@ impl File<'_> {
         }))
     }
 
-    fn track(&self, clip: usize, channel: &Channel, part: usize, place: &str) -> Result<Track> {
+    fn track(
+        &self,
+        clip: usize,
+        channel: &Channel,
+        part: usize,
+        place: &str,
+        known: &mut Tracks,
+    ) -> Result<Arc<Track>> {
         let samplers = &self.root.animations[clip].samplers;
         let sampler = self.get(samplers, channel.sampler, place)?;
         let width = if part == 1 { 4 } else { 3 };
-        let times = self.vectors(sampler.input, 1, place)?;
-        let times: Vec<f64> = times.iter().map(|time| time.x).collect();
-        let values = self.vectors(sampler.output, width, place)?;
         let (interpolation, each) = match sampler.interpolation {
             Checked::Valid(Interpolation::CubicSpline) => (Interpolation::CubicSpline, 3),
             Checked::Valid(other) => (other, 1),
             _ => return Err(self.error(place, "an unknown interpolation", "LINEAR")),
         };
+        let (input, output) = (sampler.input, sampler.output);
+        let key = [input.value(), output.value(), width, interpolation as usize];
+        if let Some(track) = known.get(&key) {
+            return Ok(track.clone());
+        }
+        let times = self.vectors(input, 1, place)?;
+        let times: Vec<f64> = times.iter().map(|time| time.x).collect();
+        let values = self.vectors(output, width, place)?;
         let ascend = times.is_sorted_by(|a, b| a < b) && times.iter().all(|t| t.is_finite());
         if !ascend || times.is_empty() || each * times.len() != values.len() {
             let counts = [counted(times.len(), "time"), counted(values.len(), "value")];
@@ -223,11 +240,13 @@ impl File<'_> {
             let expected = format!("ascending times with {} each", counted(each, "value"));
             return Err(self.error(place, found, &expected));
         }
-        Ok(Track {
+        let track = Arc::new(Track {
             times,
             values,
             interpolation,
-        })
+        });
+        known.insert(key, track.clone());
+        Ok(track)
     }
 }
 
@@ -238,5 +257,33 @@ pub fn part(channel: &Channel) -> Option<usize> {
         Checked::Valid(Property::Rotation) => Some(1),
         Checked::Valid(Property::Scale) => Some(2),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use serde_json::json;
+
+    use crate::scene::gltf::tests::{animated, animation_of, read};
+
+    #[test]
+    fn channels_of_one_sampler_share_its_keys() {
+        let mut file = animated();
+        file["scenes"][0]["nodes"] = json!([3]);
+        let nodes = file["nodes"].as_array_mut().unwrap();
+        nodes.push(json!({"children": [2]}));
+        let mut channel = file["animations"][0]["channels"][0].clone();
+        channel["target"]["node"] = json!(3);
+        let channels = file["animations"][0]["channels"].as_array_mut().unwrap();
+        channels.push(channel);
+        let scene = read(&file).unwrap();
+        let chain = &animation_of(&scene).chain;
+        let tracks: Vec<_> = chain
+            .iter()
+            .flat_map(|own| own.tracks.iter().flatten())
+            .collect();
+        assert!(tracks.len() == 2 && Arc::ptr_eq(tracks[0], tracks[1]));
     }
 }

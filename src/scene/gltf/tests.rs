@@ -49,7 +49,7 @@ fn file() -> Value {
     })
 }
 
-fn read(file: &Value) -> Result<Scene> {
+pub(super) fn read(file: &Value) -> Result<Scene> {
     let text = file.to_string();
     assert!(is_gltf(text.as_bytes()));
     read_gltf(text.as_bytes(), "t.gltf", "t", &LoadOptions::default())
@@ -108,7 +108,7 @@ fn items_are_the_boxes_of_the_transformed_triangles() {
 }
 
 /// The file with its camera turned by 90 degrees about y, from second 1 to 3.
-fn animated() -> Value {
+pub(super) fn animated() -> Value {
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let turns = [0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
     animated_by("rotation", "VEC4", 2, &turns)
@@ -140,7 +140,7 @@ fn animated_by(path: &str, kind: &str, count: usize, values: &[f32]) -> Value {
     file
 }
 
-fn animation_of(scene: &Scene) -> &CameraAnimation {
+pub(super) fn animation_of(scene: &Scene) -> &CameraAnimation {
     let animation = scene.animation.as_deref().expect("an animation");
     animation.as_ref().expect("a good one")
 }
