@@ -19,16 +19,20 @@ const DRAWN: usize = 8;
 const MORE: usize = 4;
 /// Room that an eye has on all sides, world units.
 const CLEARANCE: f64 = 0.3;
+/// Spans of items that columns hold at once; more where items are more.
+const MOST_SPANS: usize = 1 << 20;
 
 /// A place that was drawn, and what is above and below it.
+#[derive(Default)]
 struct Column {
     x: f64,
     y: f64,
     /// Floor and ceiling of the room that it is in, or of the scene.
     low: f64,
     high: f64,
-    /// The items that it passes through.
+    /// The items that it passes through; once the ground is known the lowest alone.
     spans: Vec<Span>,
+    ground: f64,
 }
 
 /// An item in a column.
@@ -90,14 +94,13 @@ struct Stand {
 /// For each of `count` eyes the lowest of the places that are drawn for it.
 fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
     let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
-    fill(stage, &mut columns);
+    fill(stage, &mut columns, height + CLEARANCE);
     // If nearly all places have an item below them, the others are beyond its edge.
     let bare = columns.iter().filter(|column| column.spans.is_empty());
     let has_ground = bare.count() * 10 < columns.len();
-    let stands = columns.chunks_mut(DRAWN).filter_map(|columns| {
-        let stands = columns.iter_mut().map(|column| {
-            let ground = column.ground(height + CLEARANCE);
-            let first = column.spans.first();
+    let stands = columns.chunks(DRAWN).filter_map(|columns| {
+        let stands = columns.iter().map(|column| {
+            let (ground, first) = (column.ground, column.spans.first());
             let is_off_mesh = !first.is_some_and(|span| span.is_ground);
             let is_beyond = has_ground && first.is_none();
             let stand = Stand {
@@ -132,14 +135,39 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
         y: rng.between(min.y, max.y),
         low: min.z,
         high: max.z,
-        spans: Vec::new(),
+        ..Column::default()
     };
     (0..DRAWN).map(place).collect()
 }
 
+/// Finds the ground of all columns, of half of them at a time if they pass through too many
+/// items. O((n + columns) log columns) where boxes are small.
+fn fill(stage: &Stage, columns: &mut [Column], room: f64) {
+    let is_filled = pierce(stage, columns);
+    for column in columns.iter_mut() {
+        if is_filled {
+            column.ground = column.level(room);
+            column.spans.truncate(1);
+        } else {
+            column.spans.clear();
+        }
+        column.spans.shrink_to_fit();
+    }
+    if !is_filled {
+        let (some, others) = columns.split_at_mut(columns.len() / 2);
+        fill(stage, some, room);
+        fill(stage, others, room);
+    }
+}
+
 /// Finds the items of all columns: by their boxes, or of a mesh by those of their
-/// triangles. O((n + columns) log columns) where boxes are small.
-fn fill(stage: &Stage, columns: &mut [Column]) {
+/// triangles. False if several columns have too many.
+fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
+    let most = match columns.len() {
+        0..=1 => usize::MAX,
+        _ => MOST_SPANS.max(stage.scene.items.len()),
+    };
+    let mut held = 0;
     let mut by_x: Vec<u32> = (0..columns.len() as u32).collect();
     by_x.sort_by(|&a, &b| columns[a as usize].x.total_cmp(&columns[b as usize].x));
     let xs: Vec<f64> = by_x.iter().map(|&c| columns[c as usize].x).collect();
@@ -151,26 +179,28 @@ fn fill(stage: &Stage, columns: &mut [Column]) {
             let column = &mut columns[c as usize];
             let beside = column.y < min.y - CLEARANCE || column.y > max.y + CLEARANCE;
             if !beside && min.z <= column.high && max.z >= column.low {
+                held -= column.spans.len();
                 column.add(Span {
                     item,
                     bottom: min.z,
                     top: max.z,
                     is_ground,
                 });
+                held += column.spans.len();
             }
         }
+        held <= most
     };
     let Some(mesh) = &stage.scene.surfaces else {
-        let items = stage.scene.items.iter().enumerate();
-        return items.for_each(|(item, b)| add(item, false, b));
+        let mut items = stage.scene.items.iter().enumerate();
+        return items.all(|(item, b)| add(item, false, b));
     };
-    for item in 0..mesh.items() {
-        for [p, q, r] in mesh.of(item) {
-            let [u, v] =
-                [q - p, r - p].map(|edge| stage.scene.up.to_z_up(edge).truncate().as_dvec2());
-            add(item, u.perp_dot(v) > 0.0, &Aabb::of_points([p, q, r]));
-        }
-    }
+    let triangles = |item| mesh.of(item).map(move |corners| (item, corners));
+    let mut triangles = (0..mesh.items()).flat_map(triangles);
+    triangles.all(|(item, [p, q, r])| {
+        let [u, v] = [q - p, r - p].map(|edge| stage.scene.up.to_z_up(edge).truncate().as_dvec2());
+        add(item, u.perp_dot(v) > 0.0, &Aabb::of_points([p, q, r]))
+    })
 }
 
 impl Column {
@@ -207,7 +237,7 @@ impl Column {
 
     /// The lowest level with so much room above it: on the lowest item, or on what
     /// stands on that, or on the floor where there is no item at all.
-    fn ground(&mut self, room: f64) -> f64 {
+    fn level(&mut self, room: f64) -> f64 {
         self.merge();
         let mut ground = self.low;
         for (i, span) in self.spans.iter().enumerate() {
@@ -225,17 +255,15 @@ impl Column {
 mod tests {
     use glam::DVec3;
 
-    use super::{Column, Span};
+    use super::{Column, MOST_SPANS, Span, Stage, drawn, fill, pierce};
     use crate::path::{self, LensDefaults};
-    use crate::scene::{self, SeededRng};
+    use crate::scene::{self, Scene, SeededRng, WorldBox};
 
     fn column(spans: impl IntoIterator<Item = [f64; 2]>) -> Column {
         let mut column = Column {
-            x: 0.0,
-            y: 0.0,
             low: 1.0,
             high: 100.0,
-            spans: Vec::new(),
+            ..Column::default()
         };
         for (item, [bottom, top]) in spans.into_iter().enumerate() {
             column.add(Span {
@@ -269,13 +297,40 @@ mod tests {
             let tops = spans.iter().map(|span| span[1]).chain([top, 1.0]);
             let levels = tops.filter(|level| *level >= top.max(1.0)).filter(is_free);
             let wanted = levels.min_by(f64::total_cmp).unwrap();
-            assert_eq!(merged.ground(2.0), wanted);
+            assert_eq!(merged.level(2.0), wanted);
             let lowest = merged.spans.first().map_or(merged.low, |span| span.bottom);
             assert_eq!(lowest, foot);
             assert_eq!(merged.spans[0].top, top);
         }
         let many = column((0..10_000).map(|item| [5.0, 6.0 + f64::from(item % 7)]));
         assert!(many.spans.capacity() <= 16, "{}", many.spans.capacity());
+    }
+
+    #[test]
+    fn columns_of_many_items_are_filled_some_at_a_time() {
+        let slab = |n: u32| {
+            let low = DVec3::Z * f64::from(n % 1500 * 3);
+            WorldBox::new(low, low + DVec3::ONE)
+        };
+        let slabs: Vec<WorldBox> = (0..1500).map(|n| slab(n * 7)).collect();
+        let scene = Scene::from_boxes("tower", &slabs).unwrap();
+        let stage = Stage {
+            scene: &scene,
+            bounds: scene.world_bounds(),
+            count: 128,
+            seed: 1,
+        };
+        let mut rng = stage.rng();
+        let mut columns: Vec<Column> = (0..128).flat_map(|_| drawn(&stage, &mut rng)).collect();
+        // All at once they would hold half as much again.
+        assert!(!pierce(&stage, &mut columns));
+        let held: usize = columns.iter().map(|column| column.spans.len()).sum();
+        assert!((MOST_SPANS..=MOST_SPANS + 1024).contains(&held), "{held}");
+        columns.iter_mut().for_each(|column| column.spans.clear());
+        fill(&stage, &mut columns, 2.0);
+        assert!(columns.iter().all(|column| column.ground == 1.0));
+        let held: usize = columns.iter().map(|column| column.spans.capacity()).sum();
+        assert_eq!(held, columns.len());
     }
 
     #[test]
