@@ -9,17 +9,23 @@ use crate::shown::counted;
 ///
 /// Cutting one that crosses itself takes time in the square of them.
 const MOST_CONCAVE: usize = 1000;
+/// Share of a larger face that its fan may cover the wrong way round.
+///
+/// Corners that are written rounded dent a convex face.
+const MOST_WRONG: f64 = 1e-4;
 
 /// Adds the triangles of a face: a fan, or the ears of a concave one.
 ///
 /// They turn as the face does. `face` holds three or more indices of points. A corner that no
 /// ear has, such as the end of a spur, is a triangle of its own, so that the triangles have the
-/// bounds of the face. O(corners); of a concave face up to their square.
+/// bounds of the face. O(corners); of a concave face up to their square. One of more than
+/// [`MOST_CONCAVE`] corners is a fan where that does not overlap but for rounding.
 ///
 /// # Errors
 /// The words "a concave face of N corners", N above [`MOST_CONCAVE`].
 pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
-    let Some(flat) = flat_if_concave(points, face) else {
+    let is_fan = |flat: &Vec<[f64; 2]>| face.len() > MOST_CONCAVE && is_fan(flat);
+    let Some(flat) = flat_if_concave(points, face).filter(|flat| !is_fan(flat)) else {
         to.extend(face[1..].windows(2).map(|pair| [face[0], pair[0], pair[1]]));
         return Ok(());
     };
@@ -61,6 +67,19 @@ fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<[f64; 2]>> {
     };
     let is_concave = normal.is_finite() && !all.clone().all(turns_left);
     is_concave.then(|| all.map(|place| seen(place).to_array()).collect())
+}
+
+/// Tests whether the triangles from the first corner hardly overlap.
+fn is_fan(flat: &[[f64; 2]]) -> bool {
+    let first = DVec2::from(flat[0]);
+    let areas = flat[1..].windows(2).map(|pair| {
+        let [a, b] = [pair[0], pair[1]].map(|corner| DVec2::from(corner) - first);
+        a.perp_dot(b)
+    });
+    let (right, wrong) = areas.fold((0.0, 0.0), |(right, wrong): (f64, f64), area| {
+        (right + area.max(0.0), wrong - area.min(0.0))
+    });
+    wrong <= MOST_WRONG * right
 }
 
 #[cfg(test)]
@@ -126,6 +145,23 @@ mod tests {
             let face: Vec<u32> = (0..count).collect();
             let found = add_triangles(&points, &face, &mut Vec::new());
             assert_eq!(found.is_ok(), is_read, "{count}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_large_convex_face_may_have_rounded_corners() {
+        let (u, v) = (DVec3::new(1.0, 0.3, 0.2), DVec3::new(-0.3, 1.0, 0.0));
+        let corner = |n: u32| {
+            let share = f64::from(n % 251) / 251.0;
+            let sides = [u * share, u + v * share, u + v - u * share, v - v * share];
+            (sides[n as usize / 251] * 1e6).round()
+        };
+        let points: Vec<DVec3> = (0..1004).map(corner).collect();
+        let mut face: Vec<u32> = (0..1004).collect();
+        for _ in 0..2 {
+            assert!(flat_if_concave(&points, &face).is_some());
+            assert_eq!(triangles(&points, &face).len(), 1002);
+            face.reverse();
         }
     }
 }
