@@ -46,13 +46,6 @@ impl InputError {
         InputError::at(file, format_args!("line {line}"), found, expected)
     }
 
-    /// Checks that a table has rows; `none` says that it has not.
-    pub(crate) fn expect_rows(file: &str, count: usize, none: &str) -> Result<()> {
-        let expected = "at least one row after the header";
-        let error = || InputError::line(file, 2, none, expected);
-        (count > 0).then_some(()).ok_or_else(error)
-    }
-
     /// An error in a binary file behind `offset` bytes.
     pub fn byte(file: &str, offset: usize, found: impl Display, expected: impl Display) -> Self {
         InputError::at(file, format_args!("byte {offset}"), found, expected)

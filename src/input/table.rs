@@ -150,6 +150,13 @@ impl<'b> TableReader<'b> {
         InputError::line(&self.file, self.header_line, found, expected)
     }
 
+    /// Checks that there were rows; `none` says that there were not.
+    pub fn expect_rows(&self, count: usize, none: &str) -> Result<()> {
+        let (line, expected) = (self.header_line + 1, "at least one row after the header");
+        let error = || InputError::line(&self.file, line, none, expected);
+        (count > 0).then_some(()).ok_or_else(error)
+    }
+
     /// Tells of columns that nothing is read from, with the nearest name that would be,
     /// or the one that stands beside it in `synonyms`.
     pub fn note_unread(&self, known: &[&str], synonyms: &[(&str, &str)]) {

@@ -162,7 +162,7 @@ pub(super) fn read_motion_csv(
             bounds(&row, &bounds_at, scene)?,
         ));
     }
-    InputError::expect_rows(file, recorded.times.len(), "no motion")?;
+    table.expect_rows(recorded.times.len(), "no motion")?;
     recorded.end_frame(&mut rows, file)?;
     Ok(recorded)
 }

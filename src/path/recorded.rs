@@ -148,7 +148,7 @@ fn rows<T>(
         }
         found.push(read(&row?)?);
     }
-    InputError::expect_rows(file, found.len(), none)?;
+    table.expect_rows(found.len(), none)?;
     Ok(found)
 }
 
@@ -452,7 +452,7 @@ mod tests {
         );
         for (text, wanted) in [
             ("", "empty file"),
-            ("x,y,z\n", "no point"),
+            ("\n\n\nx,y,z\n", "line 5: no point"),
             ("x,y,z\n1,2,q\n", "z 'q'"),
         ] {
             let error = read_points_csv(text.as_bytes(), "p.csv")

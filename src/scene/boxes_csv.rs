@@ -23,7 +23,8 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 /// # Errors
 /// A missing or wrong header; the first bad row with the number of all.
 pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene> {
-    let mut rows = read_rows(bytes, file, f64::from(f32::MAX))?;
+    let mut table = TableReader::open(bytes, file, &BOUNDS)?;
+    let mut rows = read_rows(&mut table, f64::from(f32::MAX))?;
     if let Some(first) = rows.first_bad.take().filter(|_| !skip_bad_items) {
         return Err(match rows.bad {
             1 => first,
@@ -48,9 +49,10 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
 /// # Errors
 /// A missing or wrong header, or the first bad row.
 pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
-    let mut rows = read_rows(bytes, file, f64::MAX)?;
+    let mut table = TableReader::open(bytes, file, &BOUNDS)?;
+    let mut rows = read_rows(&mut table, f64::MAX)?;
     rows.first_bad.take().map_or(Ok(()), Err)?;
-    InputError::expect_rows(file, rows.boxes.len(), "no box")?;
+    table.expect_rows(rows.boxes.len(), "no box")?;
     rows.note_near_names(file);
     Ok(rows.boxes)
 }
@@ -90,8 +92,7 @@ impl Rows {
 }
 
 /// Reads all rows; bad is also a bound beyond `limit`.
-fn read_rows(bytes: &[u8], file: &str, limit: f64) -> Result<Rows> {
-    let mut table = TableReader::open(bytes, file, &BOUNDS)?;
+fn read_rows(table: &mut TableReader, limit: f64) -> Result<Rows> {
     let is_centre = |name: &String| {
         let letters = name
             .to_lowercase()
