@@ -143,20 +143,19 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
 /// Finds the ground of all columns, of half of them at a time if they pass through too many
 /// items. O((n + columns) log columns) where boxes are small.
 fn fill(stage: &Stage, columns: &mut [Column], room: f64) {
-    let is_filled = pierce(stage, columns);
-    for column in columns.iter_mut() {
-        if is_filled {
-            column.ground = column.level(room);
-            column.spans.truncate(1);
-        } else {
-            column.spans.clear();
-        }
-        column.spans.shrink_to_fit();
+    if !pierce(stage, columns) {
+        columns
+            .iter_mut()
+            .for_each(|column| column.spans = Vec::new());
+        let halves = columns.split_at_mut(columns.len() / 2);
+        return <[_; 2]>::from(halves)
+            .into_iter()
+            .for_each(|half| fill(stage, half, room));
     }
-    if !is_filled {
-        let (some, others) = columns.split_at_mut(columns.len() / 2);
-        fill(stage, some, room);
-        fill(stage, others, room);
+    for column in columns {
+        column.ground = column.level(room);
+        column.spans.truncate(1);
+        column.spans.shrink_to_fit();
     }
 }
 

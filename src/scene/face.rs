@@ -24,8 +24,9 @@ const MOST_WRONG: f64 = 1e-4;
 /// # Errors
 /// The words "a concave face of N corners", N above [`MOST_CONCAVE`].
 pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
-    let is_fan = |flat: &Vec<[f64; 2]>| face.len() > MOST_CONCAVE && is_fan(flat);
-    let Some(flat) = flat_if_concave(points, face).filter(|flat| !is_fan(flat)) else {
+    let flat = flat_if_concave(points, face);
+    let flat = flat.filter(|flat| face.len() <= MOST_CONCAVE || !is_fan(flat));
+    let Some(flat) = flat else {
         to.extend(face[1..].windows(2).map(|pair| [face[0], pair[0], pair[1]]));
         return Ok(());
     };
@@ -34,6 +35,7 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
         return Err(format!("a concave face of {corners}"));
     }
     let mut ears: Vec<u32> = Vec::new();
+    let flat = flat.iter().map(DVec2::to_array);
     Earcut::new().earcut(flat, &[], &mut ears);
     let mut is_left = vec![true; face.len()];
     (ears.iter()).for_each(|place| is_left[*place as usize] = false);
@@ -47,7 +49,7 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
 /// A face as seen along its normal, if it turns both ways.
 ///
 /// Counter-clockwise; the normal is Newell's.
-fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<[f64; 2]>> {
+fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<DVec2>> {
     if face.len() < 4 {
         return None;
     }
@@ -66,20 +68,15 @@ fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<[f64; 2]>> {
         (b - a).perp_dot(c - b) >= 0.0
     };
     let is_concave = normal.is_finite() && !all.clone().all(turns_left);
-    is_concave.then(|| all.map(|place| seen(place).to_array()).collect())
+    is_concave.then(|| all.map(seen).collect())
 }
 
 /// Tests whether the triangles from the first corner hardly overlap.
-fn is_fan(flat: &[[f64; 2]]) -> bool {
-    let first = DVec2::from(flat[0]);
-    let areas = flat[1..].windows(2).map(|pair| {
-        let [a, b] = [pair[0], pair[1]].map(|corner| DVec2::from(corner) - first);
-        a.perp_dot(b)
-    });
-    let (right, wrong) = areas.fold((0.0, 0.0), |(right, wrong): (f64, f64), area| {
-        (right + area.max(0.0), wrong - area.min(0.0))
-    });
-    wrong <= MOST_WRONG * right
+fn is_fan(flat: &[DVec2]) -> bool {
+    let areas = flat[1..].windows(2);
+    let areas = areas.map(|pair| (pair[0] - flat[0]).perp_dot(pair[1] - flat[0]));
+    let wrong: f64 = areas.clone().filter(|area| *area < 0.0).sum();
+    -wrong <= MOST_WRONG * areas.sum::<f64>()
 }
 
 #[cfg(test)]
