@@ -1,6 +1,7 @@
 //! Recorded motions: CSV rows of a time, an item and its new bounds.
 
 use std::collections::BTreeMap;
+use std::mem;
 
 use glam::{DVec3, Vec3};
 
@@ -65,9 +66,7 @@ impl Recorded {
             let frames = (first..next).map(|n| self.frame(n));
             let rows = frames.flat_map(|(ids, rows)| ids.iter().zip(rows));
             let rows: BTreeMap<ItemId, Bounds> = rows.map(|(id, b)| (*id, *b)).collect();
-            paced.ids.extend(rows.keys());
-            paced.rows.extend(rows.values());
-            paced.ends.push(paced.ids.len());
+            paced.end_frame(&rows);
             paced.times.push(*time);
         }
         let used = self.ends[..next].last().copied().unwrap_or_default();
@@ -110,22 +109,11 @@ impl Recorded {
         }
     }
 
-    /// Ends a frame of rows, each with its line.
-    fn end_frame(
-        &mut self,
-        rows: &mut Vec<(ItemId, u64, Bounds)>,
-        file: &str,
-    ) -> Result<(), InputError> {
-        rows.sort_by_key(|row| (row.0, row.1));
-        if let Some(twice) = rows.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            let found = format!("item {} twice at one time", twice[1].0);
-            return Err(InputError::line(file, twice[1].1, found, "each item once"));
-        }
-        self.ids.extend(rows.iter().map(|row| row.0));
-        self.rows.extend(rows.iter().map(|row| row.2));
+    /// Ends a frame with what has moved in it.
+    fn end_frame(&mut self, moved: &BTreeMap<ItemId, Bounds>) {
+        self.ids.extend(moved.keys());
+        self.rows.extend(moved.values());
         self.ends.push(self.ids.len());
-        rows.clear();
-        Ok(())
     }
 }
 
@@ -145,25 +133,26 @@ pub(super) fn read_motion_csv(
     let mut table = TableReader::open(bytes, file, &COLUMNS)?;
     let [time_at, id_at, bounds_at @ ..] = table.columns(&COLUMNS)?;
     table.note_unread(&COLUMNS, &[]);
-    let (mut recorded, mut rows) = (Recorded::default(), Vec::new());
+    let (mut recorded, mut moved) = (Recorded::default(), BTreeMap::new());
     while let Some(row) = table.next_row() {
         let row = row?;
         let last = recorded.times.last().copied();
         let time = row.time(time_at, last.unwrap_or(f64::NEG_INFINITY))?;
         if last.is_some_and(|last| time > last) {
-            recorded.end_frame(&mut rows, file)?;
+            recorded.end_frame(&mem::take(&mut moved));
         }
         if last != Some(time) {
             recorded.times.push(time);
         }
-        rows.push((
-            item(&row, id_at, scene)?,
-            row.line,
-            bounds(&row, &bounds_at, scene)?,
-        ));
+        let id = item(&row, id_at, scene)?;
+        let known = moved.insert(id, bounds(&row, &bounds_at, scene)?);
+        if known.is_some() {
+            let found = format!("item {id} twice at one time");
+            return Err(row.error(found, "each item once"));
+        }
     }
     table.expect_rows(recorded.times.len(), "no motion")?;
-    recorded.end_frame(&mut rows, file)?;
+    recorded.end_frame(&moved);
     Ok(recorded)
 }
 
