@@ -16,7 +16,7 @@ use super::{
     boxes_csv, map_names,
 };
 use crate::input::{InputError, Result, is_readable, note, note_counted, read_file};
-use crate::shown::shortened;
+use crate::shown::{plain, shortened};
 use crate::spec::{Spec, SpecError, nearest};
 
 /// First part of the name of every mesh.
@@ -190,10 +190,11 @@ fn read_beside(
         let archive = zip::open(bytes, file)?;
         // Read once: a glTF may have a buffer in each of thousands of entries.
         let entries = zip::entries(&archive, file)?;
-        let entry = zip::unpack(&archive, &entries, file, map)?;
-        let names = [&format!("{file}#{}", entry.name), name];
         let named = zip::finder(&entries);
-        let folder = entry.name.rfind('/').map_or("", |end| &entry.name[..=end]);
+        let (entry, record, map) = zip::chosen(&entries, &named, file, map)?;
+        let bytes = zip::unpacked(&archive, file, (entry, record))?;
+        let names = [&format!("{file}#{}", plain(entry)), name];
+        let folder = entry.rfind('/').map_or("", |end| &entry[..=end]);
         let beside = |uri: &str| {
             let mut parts: Vec<&str> = folder.split_terminator('/').collect();
             for part in uri.split('/').filter(|part| *part != ".") {
@@ -210,7 +211,7 @@ fn read_beside(
             };
             zip::unpacked(&archive, file, (name, record))
         };
-        return read_beside(&entry.bytes, names, entry.map, options, &beside);
+        return read_beside(&bytes, names, map, options, &beside);
     }
     let extension = Path::new(file).extension();
     let is_named = |name: &str| extension.is_some_and(|e| e.eq_ignore_ascii_case(name));

@@ -25,15 +25,6 @@ pub fn is_zip(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
 }
 
-/// An entry as it was packed.
-pub struct Entry<'w> {
-    /// Its name, printable.
-    pub name: String,
-    pub bytes: Vec<u8>,
-    /// The map in it, if one is named, as in `maps.wad#MAP07`.
-    pub map: Option<&'w str>,
-}
-
 /// Names of the entries of an archive that are scenes by their names, in its order.
 pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     let archive = open(bytes, file)?;
@@ -42,26 +33,11 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     Ok(names.filter(|name| ends_in(name, &SCENES)).collect())
 }
 
-/// Unpacks the entry of a name, or the only one that is a scene.
+/// The bytes of an entry.
 ///
 /// # Errors
-/// No such entry, or several; an entry that is encrypted, packed by another method,
-/// too large for the memory, or other bytes than the directory states.
-pub fn unpack<'w>(
-    archive: &Archive,
-    entries: &[Named],
-    file: &str,
-    wanted: Option<&'w str>,
-) -> Result<Entry<'w>> {
-    let (name, record, map) = chosen(entries, file, wanted)?;
-    Ok(Entry {
-        name: plain(name),
-        bytes: unpacked(archive, file, (name, record))?,
-        map,
-    })
-}
-
-/// The bytes of an entry; errors as of [`unpack`].
+/// An entry that is encrypted, packed by another method, too large for the memory, or other
+/// bytes than the directory states.
 pub fn unpacked(
     archive: &Archive,
     file: &str,
@@ -160,13 +136,17 @@ fn ends_in(name: &str, endings: &[&str]) -> bool {
     !is_aside && endings.iter().any(|ending| name.ends_with(ending))
 }
 
-/// The entry of a name, or the only scene, and the map within it.
-fn chosen<'e, 'r, 'w>(
+/// The entry of a name, or the only scene; the map in it, if one is named, as in
+/// `maps.wad#MAP07`.
+///
+/// # Errors
+/// No such entry, or several.
+pub fn chosen<'e, 'r, 'w>(
     entries: &'e [Named<'r>],
+    named: impl Fn(&str) -> Option<&'e Named<'r>>,
     file: &str,
     wanted: Option<&'w str>,
 ) -> Result<(&'e str, &'e ZipFileHeaderRecord<'r>, Option<&'w str>)> {
-    let named = finder(entries);
     let whole = wanted.map(|wanted| (wanted, None));
     let text = wanted.unwrap_or_default();
     let signs = text.rmatch_indices('#');
