@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
-use std::mem;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
@@ -301,42 +300,40 @@ pub fn write(
     ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
 ) -> anyhow::Result<bool> {
     let mut out = BufWriter::new(io::stdout().lock());
-    // Written with the next row: an error before the first is all that is said.
-    let mut before = match format {
-        RowFormat::Csv => record(columns.iter().map(|column| column.0))?,
-        RowFormat::Json => b"[".to_vec(),
-    };
-    let mut put = |row: &Row| -> io::Result<()> {
-        out.write_all(&mem::take(&mut before))?;
-        let values = columns.iter();
-        let values = values.map(|(name, value)| ((*name).to_owned(), value(row)));
+    let mut before = "[";
+    // The head comes with the first rows: an error before them is all that is said.
+    let mut head = Some(columns.iter().map(|column| column.0));
+    let mut put = |rows: &[Row]| -> io::Result<()> {
         if format == RowFormat::Csv {
-            return out.write_all(&record(values.map(|(_, value)| cell(&value)))?);
+            let mut csv = csv::Writer::from_writer(&mut out);
+            head.take().map_or(Ok(()), |head| csv.write_record(head))?;
+            for row in rows {
+                csv.write_record(columns.iter().map(|(_, value)| cell(&value(row))))?;
+            }
+            return csv.flush();
         }
-        before = b",".to_vec();
-        let object = serde_json::to_string_pretty(&Map::from_iter(values))?;
-        write!(out, "\n  {}", object.replace('\n', "\n  "))
+        for row in rows {
+            let values = columns.iter();
+            let values = values.map(|(name, value)| ((*name).to_owned(), value(row)));
+            let object = serde_json::to_string_pretty(&Map::from_iter(values))?;
+            write!(out, "{before}\n  {}", object.replace('\n', "\n  "))?;
+            before = ",";
+        }
+        Ok(())
     };
-    let agree = ask(&mut |rows| unread_is_fine(rows.iter().try_for_each(&mut put)));
-    let end = match (format, &before[..]) {
+    let agree = ask(&mut |rows| unread_is_fine(put(&rows)));
+    if agree.is_err() {
         // No answers but a beginning: it is not shown.
-        _ if agree.is_err() => {
-            drop(out.into_parts());
-            return agree;
-        }
-        (RowFormat::Csv, header) => header,
-        (_, b"[") => b"[]\n",
-        _ => b"\n]\n",
-    };
-    unread_is_fine(out.write_all(end).and_then(|()| out.flush()))?;
+        drop(out.into_parts());
+        return agree;
+    }
+    let ended = put(&[]).and_then(|()| match (format, before) {
+        (RowFormat::Csv, _) => Ok(()),
+        (_, "[") => out.write_all(b"[]\n"),
+        _ => out.write_all(b"\n]\n"),
+    });
+    unread_is_fine(ended.and_then(|()| out.flush()))?;
     agree
-}
-
-/// A line of CSV.
-fn record(cells: impl IntoIterator<Item = impl AsRef<[u8]>>) -> csv::Result<Vec<u8>> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record(cells)?;
-    csv.into_inner().map_err(|error| error.into_error().into())
 }
 
 /// A value as CSV holds it: ids separated by spaces, nothing for null.
