@@ -24,6 +24,6 @@ shards=${SLURM_ARRAY_TASK_COUNT:?not a task of an array: sbatch --array=1-N}
 folder=$out/shard-$shard
 
 if [ -e "$folder/stream.jsonl" ]; then
-    exec "$program" run --resume --out "$folder"
+    exec "$program" run "$@" --resume --out "$folder"
 fi
 exec "$program" run "$@" --shard "$shard/$shards" --out "$folder"

@@ -3,6 +3,8 @@
 
 use std::fs;
 use std::path::Path;
+#[cfg(unix)]
+use std::process::Command;
 
 use serde_json::Value;
 
@@ -291,4 +293,25 @@ fn files_of_cameras_and_motions_are_the_same_in_all_shards() {
     works(folder.path(), &format!("{plan} 2/2 --out other"));
     let wanted = "other: plan differs: files 'cameras.csv | and 'cameras.csv | in part1";
     all_refused(&folder, &["merge part1 other --out merged"], wanted);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_task_of_an_array_has_its_options_also_when_it_goes_on() {
+    let folder = folder(&[]);
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/slurm-array.sh");
+    let asked = || {
+        let mut task = Command::new("sh");
+        task.args([script, "r", "--timeout", "9"]);
+        task.env("CULLBENCH", "echo")
+            .env("SLURM_ARRAY_TASK_ID", "3");
+        task.env("SLURM_ARRAY_TASK_COUNT", "8");
+        let done = task.current_dir(folder.path()).output().expect("a shell");
+        String::from_utf8(done.stdout).expect("UTF-8")
+    };
+    assert_eq!(asked(), "run --timeout 9 --shard 3/8 --out r/shard-3\n");
+    let begun = folder.path().join("r/shard-3");
+    fs::create_dir_all(&begun).expect("made");
+    fs::write(begun.join("stream.jsonl"), "").expect("writable");
+    assert_eq!(asked(), "run --timeout 9 --resume --out r/shard-3\n");
 }
