@@ -17,7 +17,8 @@ use super::figure::{Axis, Figure, LINE, is_drawn, line};
 use super::page::to_page;
 use super::run_resume::newest_run;
 use super::run_table::{name, place, short};
-use super::{Ending, expect_places, run_plan, text, unread_is_fine, write_if};
+use super::shared_args::each_once;
+use super::{Ending, expect_places, text, unread_is_fine, write_if};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -46,7 +47,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
         (Gate::Work, true) => WORK.to_vec(),
         (Gate::Work, false) => bail!("--metric names times; expected none with --gate work"),
     };
-    run_plan::each_once("metric", &metrics)?;
+    each_once("metric", &metrics)?;
     let files = match (&args.baseline, &args.old, &args.new) {
         // The only run that is named is NEW.
         (Some(name), new, _) => baseline_and(name, new.clone())?,

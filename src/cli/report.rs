@@ -16,10 +16,11 @@ use super::document::{Block, Column, Table, to_html, to_markdown};
 use super::figure::{Axis, ends, is_drawn};
 use super::page::{glossary, origin};
 use super::run_table::{self, distinct, name, question};
+use super::shared_args::each_once;
 use super::surface_tables::{self, Picture};
 use super::{
-    Ending, expect_folder, expect_places, program, run_figures, run_plan, run_verdict, text,
-    write_if, write_text,
+    Ending, expect_folder, expect_places, program, run_figures, run_verdict, text, write_if,
+    write_text,
 };
 use crate::measure::{Metric, Status};
 use crate::report::{
@@ -39,7 +40,7 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     if let Some(path) = &args.history {
         let reports = args.reports.iter().map(|path| read_report(path));
         let reports = reports.collect::<Result<Vec<_>, _>>()?;
-        run_plan::each_once("run", reports.iter().map(|report| &report.run.id))?;
+        each_once("run", reports.iter().map(|report| &report.run.id))?;
         write_text(path, &history(reports))?;
         return Ok(Ending::Ok);
     }
@@ -113,7 +114,7 @@ pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
     if all_columns {
         blocks = details(&all, &BTreeMap::new());
     }
-    for group in run_table::groups(&all) {
+    for (_, group) in run_table::groups(&all) {
         let overall = Overall::of(&group);
         blocks.push(Block::line(""));
         match &group[..] {
@@ -143,17 +144,16 @@ fn title(report: &Report) -> String {
 fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     let mut blocks = vec![Block::Heading(1, title(report))];
     let all = comparisons(report);
-    let groups = run_table::groups(&all);
-    for (group, of) in groups.iter().zip(run_table::settings(&groups)) {
-        let overall = Overall::of(group);
-        let conclusion = run_verdict::conclusion(group, &overall);
+    for (of, group) in run_table::groups(&all) {
+        let overall = Overall::of(&group);
+        let conclusion = run_verdict::conclusion(&group, &overall);
         blocks.push(Block::Line(text::labelled(&of, &conclusion)));
         if let Some(base) = overall.base.filter(|_| group.len() > 1) {
             let names = group.iter().map(|comparison| run_figures::of(comparison));
-            let table = run_table::matrix(names.collect(), group, &overall);
+            let table = run_table::matrix(names.collect(), &group, &overall);
             let heading = text::joined([&format!("Speed-up over {base}"), &of]);
             let heading = Block::Heading(2, heading);
-            let legend = Block::Line(run_table::legend(group, &overall));
+            let legend = Block::Line(run_table::legend(&group, &overall));
             blocks.extend([heading, Block::Heat(table), legend]);
         }
     }

@@ -1,14 +1,13 @@
 //! The plan of `cullbench run`: scenes, paths, structures and culling tests,
 //! checked as far as possible before anything runs.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 
 use super::args::RunArgs;
-use super::shared_args::WhatArgs;
+use super::shared_args::{WhatArgs, each_once};
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
@@ -106,19 +105,6 @@ fn shard(text: &str) -> Result<(usize, usize)> {
     let sound = numbers.filter(|&(i, n)| 1 <= i && i <= n && !text.contains('+'));
     let expected = "expected i/n with i from 1 to n, such as 2/4";
     sound.with_context(|| format!("--shard is '{text}'; {expected}"))
-}
-
-/// Refuses a name that comes twice: a cell is found by its names.
-pub fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<()> {
-    let mut seen = BTreeSet::new();
-    for name in names {
-        let name = name.as_ref();
-        ensure!(
-            seen.insert(name.to_owned()),
-            "{what} '{name}' is named twice; expected each once"
-        );
-    }
-    Ok(())
 }
 
 impl RunPlan {

@@ -16,18 +16,15 @@ use crate::spec::parse_number;
 use crate::statistics::Estimate;
 
 /// Comparisons of one cache state and culling test each.
-pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<Vec<&'a Comparison<'r>>> {
+///
+/// With the settings that tell groups apart, "cold, six-box"; nothing of a single one.
+pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<(String, Vec<&'a Comparison<'r>>)> {
     let groups = grouped(all.iter().map(|comparison| (key(comparison), comparison)));
-    groups.into_iter().map(|(_, group)| group).collect()
-}
-
-/// Settings that tell groups apart: "cold, six-box"; nothing of a single one.
-pub fn settings(groups: &[Vec<&Comparison>]) -> Vec<String> {
-    let keys: Vec<[&str; 3]> = groups.iter().map(|group| key(group[0])).collect();
-    let differs = |n: &usize| keys.iter().any(|key| key[*n] != keys[0][*n]);
+    let differs = |n: &usize| groups.iter().any(|(key, _)| key[*n] != groups[0].0[*n]);
     let parts: Vec<usize> = (0..3).filter(differs).collect();
-    let name = |key: &[&str; 3]| text::joined(parts.iter().map(|&n| key[n].replace("_ns", "")));
-    keys.iter().map(name).collect()
+    let name = |key: [&str; 3]| text::joined(parts.iter().map(|&n| key[n].replace("_ns", "")));
+    let groups = groups.into_iter();
+    groups.map(|(key, group)| (name(key), group)).collect()
 }
 
 /// Cache state, culling test and kind of time: times of others are not averaged.
@@ -256,8 +253,7 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
 /// Meaning of the figures of a [`matrix`].
 pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
     let unit = text::some(overall.base, |base| {
-        let is_still = all[0].about().path.motion.is_empty();
-        let per = ["frame", "query"][usize::from(is_still)];
+        let per = all[0].about().ranked_by().replace("_ns", "");
         format!("; {base}: time per {per}, others: x {base}")
     });
     format!("* fastest or tied{unit}")

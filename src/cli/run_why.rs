@@ -1,7 +1,7 @@
 //! `run --why STRUCTURE`: tests and time per test beside the best structure's.
 
 use super::document::{Block, Table};
-use super::run_table::{distinct, groups, labels, settings};
+use super::run_table::{distinct, groups, labels};
 use super::run_verdict::times;
 use super::text::{self, shortened, some};
 use crate::report::{Comparison, Report, ReportCell, comparisons};
@@ -24,13 +24,12 @@ struct Pair<'r> {
 /// A table and a sentence for each cache state and culling test.
 pub fn blocks(report: &Report, structure: &str) -> Vec<Block> {
     let (all, mut blocks) = (comparisons(report), Vec::new());
-    let groups = groups(&all);
-    for (group, of) in groups.iter().zip(settings(&groups)) {
+    for (of, group) in groups(&all) {
         let pairs = group.iter().map(|comparison| pair(comparison, structure));
         let pairs: Vec<Result<Pair, String>> = pairs.collect();
         let (table, sentence) = match &pairs[..] {
             [Ok(one)] => (of_one(one), one.sentence()),
-            _ => of_many(&labels(group), &pairs, structure),
+            _ => of_many(&labels(&group), &pairs, structure),
         };
         if !table.rows.is_empty() {
             blocks.extend([Block::Table(table), Block::line("")]);

@@ -2,6 +2,8 @@
 //!
 //! Scenes, lenses, culling tests, instruction sets, and the processes of a study.
 
+use std::collections::BTreeSet;
+
 use super::text;
 use crate::camera::{
     DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
@@ -103,6 +105,19 @@ pub struct MotionArgs {
     pub update: Option<String>,
 }
 
+/// Refuses a name that comes twice: a cell is found by its names.
+pub fn each_once(what: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<()> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        let name = name.as_ref();
+        ensure!(
+            seen.insert(name.to_owned()),
+            "{what} '{name}' is named twice; expected each once"
+        );
+    }
+    Ok(())
+}
+
 /// Seed of the first of some generated cases.
 pub fn first_seed(seed: Option<u64>, cases: u64) -> Result<u64> {
     let is_used = seed.is_none() || cases > 0;
@@ -138,14 +153,9 @@ impl MotionArgs {
 /// Labels stay as they are under [`UpdatePolicy::Refit`]. A structure that does not
 /// refit is built again in any case: it appears once.
 fn under_policies(list: &str, specs: &[StructureSpec]) -> Result<Vec<StructureSpec>> {
-    let mut policies: Vec<UpdatePolicy> = Vec::new();
-    for text in list.split(',').map(str::trim) {
-        let policy = text.parse()?;
-        if policies.contains(&policy) {
-            bail!("--update '{text}' is named twice; expected each once");
-        }
-        policies.push(policy);
-    }
+    let policies = list.split(',').map(|text| text.trim().parse());
+    let policies: Vec<UpdatePolicy> = policies.collect::<Result<_, _>>()?;
+    each_once("--update", policies.iter().map(ToString::to_string))?;
     let mut all: Vec<StructureSpec> = Vec::new();
     for spec in specs {
         for &policy in &policies {
