@@ -236,10 +236,8 @@ impl Look {
 pub fn mark(look: Look, kind: &str, [x, y]: [f64; 2], note: &str) -> String {
     let class = if look.hollow { "mark hollow" } else { "mark" };
     let corners = SHAPES[look.shape];
-    let note = match note {
-        "" => String::new(),
-        note => format!("<title>{}</title>", html(note)),
-    };
+    let note = Some(note).filter(|note| !note.is_empty());
+    let note = text::some(note, |note| format!("<title>{}</title>", html(note)));
     format!(
         "<svg x=\"{x:.2}%\" y=\"{y:.1}\" overflow=\"visible\"><polygon class=\"{class}{kind}\" \
          points=\"{corners}\">{note}</polygon></svg>"

@@ -6,7 +6,7 @@ use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, Column, Table};
 use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
 use super::{run_figures, text};
-use crate::measure::YARDSTICK;
+use crate::measure::{Metric, YARDSTICK};
 use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
@@ -129,22 +129,21 @@ fn of_growths(growths: &[Growth]) -> Table {
 /// One figure per class of shares that has at least two sizes; their axes are the same.
 pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
-        let points = surface.curve(name, class, "query_ns");
-        let is_drawn = |p: &&(usize, f64)| is_drawn(p.0 as f64) && is_drawn(p.1);
-        let point = |&(items, ns): &(usize, f64)| {
-            let here = |place: &&Place| place.class == class && place.items == items;
-            let mut cells = (surface.places.iter().filter(here)).filter_map(|p| p.cell(name));
-            let metric = cells.next().and_then(|cell| cell.metrics.get("query_ns"));
-            let time = text::some(metric, |ns| text::time_within(ns.estimate()));
-            Point {
-                at: [items as f64, ns],
-                ends: metric.and_then(|metric| ends(metric.estimate())),
-                note: format!("{name}, {}: {time}", text::count(items)),
-                ..Point::default()
-            }
+        let here = surface.places.iter().filter(|place| place.class == class);
+        let times = here.filter_map(|p| Some((p.items, p.cell(name)?.metrics.get("query_ns")?)));
+        let mut times: Vec<(usize, &Metric)> = times.collect();
+        times.dedup_by_key(|time| time.0);
+        let is_drawn = |t: &&(usize, &Metric)| is_drawn(t.0 as f64) && is_drawn(t.1.value);
+        let point = |&(items, time): &(usize, &Metric)| Point {
+            at: [items as f64, time.value],
+            ends: ends(time.estimate()),
+            note: text::joined([name, &text::count(items)])
+                + ": "
+                + &text::time_within(time.estimate()),
+            ..Point::default()
         };
-        let drawn: Vec<Point> = points.iter().filter(is_drawn).map(point).collect();
-        (points.len() - drawn.len(), drawn)
+        let drawn: Vec<Point> = times.iter().filter(is_drawn).map(point).collect();
+        (times.len() - drawn.len(), drawn)
     };
     let is_scan = |name: &str| {
         let cells = surface.places.iter().filter_map(|place| place.cell(name));

@@ -90,12 +90,17 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         let front = front.with_context(|| cameras.place(view))?;
         let truth = Truth::of_scene(camera, &scene);
         let fates = fates(items, answer, truth.as_ref(), front.as_deref());
-        let fates: Vec<Fate> = order.iter().map(|&id| fates[id as usize]).collect();
         fates.iter().for_each(|fate| totals[*fate as usize] += 1);
-        let index = if all > most { view * all / most } else { view };
+        let set = |fate: Fate| runs(order.iter().map(|&id| fates[id as usize] == fate));
+        data.frames.push(Frame {
+            camera: if all > most { view * all / most } else { view },
+            clip: clip_matrix(camera, scene.origin, downward).to_cols_array(),
+            visible: set(Fate::Visible),
+            false_positive: set(Fate::FalsePositive),
+            hidden: set(Fate::Hidden),
+            lost: set(Fate::Lost),
+        });
         bar.inc(1);
-        let clip = clip_matrix(camera, scene.origin, downward);
-        data.frames.push(Frame::of(index, clip, &fates));
     }
     bar.finish_and_clear();
     data.samples = samples.map(|grid| format!("{}x{}", grid.width, grid.height));
@@ -290,6 +295,7 @@ pub struct Frame {
     pub camera: usize,
     /// Scene-local to clip coordinates (near depth -1, far depth 1), column by column.
     clip: [f64; 16],
+    /// Items by their fates, in the order of the curve.
     visible: String,
     false_positive: String,
     hidden: String,
@@ -356,21 +362,6 @@ impl ViewData {
         };
         let order = order.into_iter().map(|(_, item)| item as ItemId);
         (data, order.collect())
-    }
-}
-
-impl Frame {
-    /// A view with the fates of all items, in the order of the curve.
-    pub fn of(index: usize, clip: DMat4, fates: &[Fate]) -> Frame {
-        let set = |fate: Fate| runs(fates.iter().map(|own| *own == fate));
-        Frame {
-            camera: index,
-            clip: clip.to_cols_array(),
-            visible: set(Fate::Visible),
-            false_positive: set(Fate::FalsePositive),
-            hidden: set(Fate::Hidden),
-            lost: set(Fate::Lost),
-        }
     }
 }
 
