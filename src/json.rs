@@ -1,15 +1,14 @@
 //! Reading JSON, with errors that name place, text found and text expected, in
 //! other words than those of the reader's program.
 
-use std::fmt;
-
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;
 
 use crate::shown::plain;
 
 /// Difference of a text from the JSON that was expected.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{}: {found}; expected {}", self.place(), self.expected_of("JSON"))]
 pub struct JsonError {
     /// Line, from 1; the reader of a file of several texts sets it to that of the file.
     pub line: usize,
@@ -41,15 +40,6 @@ impl JsonError {
         }
     }
 }
-
-impl fmt::Display for JsonError {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let (place, found) = (self.place(), &self.found);
-        write!(f, "{place}: {found}; expected {}", self.expected_of("JSON"))
-    }
-}
-
-impl std::error::Error for JsonError {}
 
 /// Reads a value. A byte order mark in front is skipped.
 ///

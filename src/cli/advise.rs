@@ -255,8 +255,8 @@ fn ties(names: &[impl AsRef<str>]) -> String {
     some(names.first(), tied)
 }
 
-/// Columns of features; those from the sixth on are evidence.
-fn features<'o>() -> [Column<&'o Omission>; 12] {
+/// Columns of features; those from the seventh on are evidence.
+fn features<'o>() -> [Column<&'o Omission>; 13] {
     [
         ("feature", |rule| rule.rule.left_out.to_owned()),
         ("needed", |rule| {
@@ -273,6 +273,7 @@ fn features<'o>() -> [Column<&'o Omission>; 12] {
             Some([with, without]) if (with / without).is_finite() => times(with / without),
             _ => String::new(),
         }),
+        ("", |rule| rule.reason.clone()),
         (">statistic", |rule| some(rule.statistic, significant)),
         (">needed above", |rule| some(rule.threshold, significant)),
         ("measured on", |rule| {
@@ -319,12 +320,8 @@ fn rule_table(rules: &[Omission], all_columns: bool) -> Table {
         }
     }
     let features = features();
-    let mut columns = features[..5].to_vec();
-    columns.push(("", |rule| rule.reason.clone()));
-    if all_columns {
-        columns.extend(&features[5..]);
-    }
-    Table::with(&rules, &columns)
+    let shown = if all_columns { features.len() } else { 6 };
+    Table::with(&rules, &features[..shown])
 }
 
 #[cfg(test)]

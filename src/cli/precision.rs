@@ -16,14 +16,14 @@ use super::study::{ROUNDS, Study, load};
 use super::text::{self, significant, some, time_plus_minus};
 use super::{Ending, diagram, expect_places, print, write_if};
 use crate::index::Registry;
-use crate::measure::{ProcessTimes, Setting, Status};
+use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, Names, Point, Precision, SWEEPS, Sweep, SweepRow, sweep};
 use crate::report::grouped;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
     expect_places(&outputs, &[&args.study.scene, &args.study.path])?;
-    let setting = setting(registry, args, None)?;
+    let setting = load(registry, &args.study, ROUNDS, None, [2, 0, 0])?;
     let spread = &args.study.spread;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 0, spread)?;
@@ -72,16 +72,11 @@ fn blocks(outcome: &Precision, all: bool, room: usize) -> Vec<Block> {
     blocks
 }
 
-/// The inputs of the command itself, or of a worker.
-fn setting(registry: &Registry, args: &PrecisionArgs, timing: Option<&Timing>) -> Result<Setting> {
-    load(registry, &args.study, ROUNDS, timing, [2, 0, 0])
-}
-
 /// Times all points in one process.
 pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Result<ProcessTimes> {
-    let setting = setting(registry, args, Some(timing))?;
-    let frames = args.frames as usize;
-    Ok(precision::time(&setting, frames, &timing.plan()?)?)
+    let setting = load(registry, &args.study, ROUNDS, Some(timing), [0; 3])?;
+    let plan = timing.plan()?;
+    Ok(precision::time(&setting, args.frames as usize, &plan)?)
 }
 
 pub fn conclusions(p: &Precision) -> Vec<String> {
