@@ -132,8 +132,7 @@ pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
         blocks.extend(notes.map(Block::Line));
         blocks.push(Block::Line(run_verdict::conclusion(&group, &overall)));
     }
-    // A world of one size has its ranked tables; that is the surface.
-    blocks.extend(surface_tables::blocks(report, 2));
+    blocks.extend(surface_tables::blocks(report));
     blocks
 }
 
@@ -163,7 +162,7 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     blocks.extend(details(&all, views));
     let every: Vec<&Comparison> = all.iter().collect();
     blocks.extend(run_table::choices(&every).into_iter().map(Block::Line));
-    blocks.extend(surface_tables::blocks(report, 1));
+    blocks.extend(surface_tables::blocks(report));
     blocks.push(Block::Heading(2, "Statuses".to_owned()));
     let cells = text::counted(report.cells.len(), "cell");
     let reasons = run_table::reasons(&every);

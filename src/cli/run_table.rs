@@ -135,15 +135,16 @@ pub const OF_FRAMES: [Figure; 8] = [
 
 /// A row per structure of one scene and path.
 ///
-/// In full with intervals, lower bounds and every figure.
+/// In full with intervals, lower bounds and every figure; else what a wide terminal has
+/// room for.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
     let is_still = comparison.about().path.motion.is_empty();
     let time = ["time per frame", "time per query"][usize::from(is_still)];
     let figures = match (is_still, is_full) {
         (true, true) => OF_QUERIES.to_vec(),
-        (true, false) => OF_QUERIES[..2].to_vec(),
+        (true, false) => [&OF_QUERIES[..3], &OF_QUERIES[4..6]].concat(),
         (false, true) => [&OF_FRAMES, &OF_QUERIES[..2]].concat(),
-        (false, false) => [&OF_FRAMES[..3], &OF_FRAMES[6..7]].concat(),
+        (false, false) => [&OF_FRAMES[..3], &OF_FRAMES[6..7], &OF_QUERIES[..2]].concat(),
     };
     let peer = comparison.fastest_peer().filter(|_| is_full);
     let of_base = text::some(base, |base| format!("vs {}", text::plain(base)));

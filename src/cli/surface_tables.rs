@@ -6,7 +6,7 @@ use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, Column, Table};
 use super::figure::{Axis, Figure, ends, is_drawn, left_out, picture};
 use super::{run_figures, text};
-use crate::measure::{Metric, YARDSTICK};
+use crate::measure::Metric;
 use crate::report::{
     Crossing, Growth, Overall, Place, Report, ReportCell, Surface, comparisons, growths, surfaces,
 };
@@ -73,21 +73,21 @@ fn two_digits(items: f64) -> usize {
     ((items / unit).round() * unit) as usize
 }
 
-/// Crossovers and growth of a report, in tables and figures; a surface has as many
-/// `sizes`, or one size and several shares.
-pub fn blocks(report: &Report, sizes: usize) -> Vec<Block> {
+/// Crossovers and growth of worlds in several sizes, in tables and figures.
+pub fn blocks(report: &Report) -> Vec<Block> {
     let mut blocks = Vec::new();
-    let is_shown = |surface: &&Surface| surface.spans() && surface.sizes().len() >= sizes;
+    // A world of one size has its ranked tables.
+    let is_shown = |surface: &&Surface| surface.sizes().len() > 1;
     for surface in surfaces(comparisons(report)).iter().filter(is_shown) {
+        let legend = Block::line(
+            "The fastest structure (= ties) and its speed-up vs linear, none if a scan wins or \
+             linear has no time. Shares are rounded on a log scale to 1, 1.5, 2, 3, 5, 7, 10, ... \
+             percent; (at ...) gives a share that is more than a tenth off. ~ N is interpolated \
+             between two sizes, on log scales.",
+        );
+        let legend = Some(legend).filter(|_| blocks.is_empty());
         blocks.push(Block::heading(format!("Crossover: {}", title(surface))));
-        let mut yardsticks = surface.places.iter().filter_map(|p| p.cell(YARDSTICK));
-        let speedup = |_| " and its speed-up vs linear; none if a scan wins";
-        let speedups = yardsticks.next().map_or("", speedup);
-        blocks.push(Block::Line(format!(
-            "The fastest structure (= those not told from it){speedups}. Shares are rounded on \
-             a log scale to 1, 1.5, 2, 3, 5, 7, 10, ... percent; (at ...) gives a share that is \
-             more than a tenth off. ~ N is interpolated between two sizes, on log scales."
-        )));
+        blocks.extend(legend);
         blocks.push(Block::Table(winners(surface)));
         blocks.extend(crossings(surface).map(Block::Table));
         let figures = growth(surface).into_iter();

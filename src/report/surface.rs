@@ -129,11 +129,6 @@ impl Surface<'_> {
         classes
     }
 
-    /// Returns true if there is more than one size or share.
-    pub fn spans(&self) -> bool {
-        self.sizes().len() > 1 || self.classes().len() > 1
-    }
-
     /// Structures with such sound cells, in the order they first appear.
     pub fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let cells = self.places.iter().flat_map(|p| p.comparison.sound());
