@@ -19,6 +19,7 @@ use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, Names, Point, Precision, SWEEPS, Sweep, SweepRow, sweep};
 use crate::report::grouped;
+use crate::statistics::Estimate;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -149,10 +150,12 @@ pub fn is_wrong(point: &Point) -> bool {
 }
 
 fn of_storage(p: &Precision) -> Option<String> {
-    let memory = |point: &&Point| point.memory_bytes_per_item;
-    let least = p.points.iter().filter(is_safe);
-    let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
-    let (name, bytes) = (named(least), text::significant(memory(&least)));
+    let memory = |point: &Point| point.memory_bytes_per_item;
+    let mut sound = p.points.iter().filter(is_safe);
+    let least = sound.clone().map(memory).min_by(f64::total_cmp)?;
+    // The fastest of those that need no more to speak of.
+    let least = sound.find(|point| memory(point) <= 1.01 * least)?;
+    let (name, bytes) = (named(least), text::significant(memory(least)));
     let extra = extras(least);
     let time = text::some(least.query_ns(), text::time);
     Some(format!(
@@ -255,8 +258,8 @@ fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         add(title, errors_table(&p.points), ERRORS_NOTE);
     }
     let title = "Pareto front of error, memory and time, fastest first";
-    let whole = front_table(p);
-    let front = whole.within(room, &["tie", "B/item", "FN ppm"]);
+    let whole = front_table(p, all);
+    let front = whole.within(room, &["FP 95 %", "tie", "alike", "B/item"]);
     let heads = whole.header.iter();
     let gone = match text::joined(heads.filter(|head| !front.header.contains(head))) {
         none if none.is_empty() => none,
@@ -294,9 +297,10 @@ const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none obs
 
 /// Meaning of the front.
 const FRONT_NOTE: &str = "No other point is significantly better in an error, the depth of misses, \
-     memory or time and as good in the rest (intervals paired by camera and by process). c: factor \
-     of the conservative epsilon. FP: false positives, % of the visible items; FN: visible items \
-     missed, millionths; <: none observed, 95 % upper bound.";
+     memory or time and as good in the rest (intervals paired by camera and by process). alike: \
+     further points of the same errors (--all). c: factor of the conservative epsilon. FP: false \
+     positives, % of the visible items; FN: visible items missed, millionths; <: none observed, \
+     95 % upper bound.";
 
 pub fn named(point: &Point) -> String {
     format!("{} with {}", structure(point), culling(&point.names))
@@ -335,18 +339,40 @@ fn errors_table(points: &[Point]) -> Table {
     Table::with(points, columns)
 }
 
-fn front_table(p: &Precision) -> Table {
-    let columns: &[Column<&Point>] = &[
-        ("structure", |p| structure(p)),
-        ("culling", |p| culling(&p.names)),
-        (">query", |p| time_plus_minus(p.time)),
-        (">FP %", |p| text::rate(p.excess, 100.0)),
-        (">FN ppm", |p| text::rate(p.false_negative_ppm, 1.0)),
-        (">B/item", |p| format!("{:.1}", p.memory_bytes_per_item)),
-        ("tie", |p| if p.is_tie { "tie" } else { "" }.to_owned()),
+/// A row for those of one structure, test, arithmetic and errors: the fastest that is safe
+/// by its margin, or the fastest; with `all` a row for each.
+fn front_table(p: &Precision, all: bool) -> Table {
+    let key = |i: usize| {
+        let point = &p.points[i];
+        let errors = point.counts.map(|e| (e.false_positives, e.false_negatives));
+        let (names, own) = (&point.names, all.then_some(i));
+        (structure(point), names.test, names.arithmetic, errors, own)
+    };
+    let alike = grouped(p.front.iter().map(|&i| (key(i), &p.points[i])));
+    let columns: &[Column<Vec<&Point>>] = &[
+        ("structure", |p| structure(p[0])),
+        ("culling", |p| culling(&p[0].names)),
+        (">query", |p| time_plus_minus(p[0].time)),
+        (">alike", |p| {
+            some((p.len() > 1).then(|| p.len() - 1), |n| n.to_string())
+        }),
+        (">B/item", |p| format!("{:.1}", p[0].memory_bytes_per_item)),
+        (">FP %", |p| match p[0].excess {
+            Some(found) if found.value > 0.0 => significant(100.0 * found.value),
+            none => text::rate(none, 100.0),
+        }),
+        (">FN ppm", |p| text::rate(p[0].false_negative_ppm, 1.0)),
+        (">FP 95 %", |p| {
+            let found = p[0].excess.filter(|found| found.value > 0.0);
+            text::interval(found.and_then(Estimate::ends), 0.01)
+        }),
+        ("tie", |p| if p[0].is_tie { "tie" } else { "" }.to_owned()),
     ];
-    let points = p.front.iter().map(|&i| &p.points[i]);
-    Table::with(points, columns).without_empty_columns()
+    let rows = alike.into_iter().map(|(_, mut points)| {
+        points.sort_by_key(|point| !is_safe(point));
+        points
+    });
+    Table::with(rows, columns).without_empty_columns()
 }
 
 /// The structure without its parameters.
@@ -416,7 +442,7 @@ mod tests {
                 false_negatives: misses,
                 ..Default::default()
             });
-            row.false_negative_ppm = Some(crate::statistics::Estimate {
+            row.false_negative_ppm = Some(Estimate {
                 value: misses as f64,
                 lower: None,
                 upper: Some(bound + 9.0 * misses as f64),
