@@ -23,6 +23,8 @@ pub struct Machine {
     pub instruction_set: String,
     /// Logical processors that this process may use.
     pub cores: usize,
+    /// Logical processors of the whole machine, which its load is of.
+    pub machine_cores: Option<usize>,
     /// Data and unified caches of the first core, innermost first.
     pub caches: Vec<Cache>,
     /// Physical memory.
@@ -90,6 +92,7 @@ impl Machine {
             cpu: brand.filter(|brand| !brand.is_empty()),
             features: simd_features(),
             instruction_set: Kernel::best().name().to_owned(),
+            machine_cores: system.as_ref().map(|s| s.cpus().len()),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             caches: caches(Path::new("/sys/devices/system/cpu/cpu0/cache")),
             memory_bytes: system.map(|s| s.total_memory()),
@@ -107,8 +110,9 @@ impl Machine {
 
     /// Sentence on a machine that was busy: half a process a core or more.
     pub fn busy(&self) -> Option<String> {
-        let load = self.load.filter(|load| *load > 0.5 * self.cores as f64)?;
-        let cores = counted(self.cores, "core");
+        let cores = self.machine_cores.unwrap_or(self.cores);
+        let load = self.load.filter(|load| *load > 0.5 * cores as f64)?;
+        let cores = counted(cores, "core");
         Some(format!(
             "the machine was already busy (load average {load:.1} on {cores})"
         ))
@@ -216,6 +220,23 @@ mod tests {
         let toolchain = Toolchain::capture();
         assert!(toolchain.rustc.unwrap().starts_with("rustc 1."));
         assert_eq!(toolchain.lock_digest.len(), 64);
+    }
+
+    #[test]
+    fn a_load_is_of_the_machine_and_not_of_the_cores_of_a_process() {
+        let machine = |load, machine_cores| Machine {
+            cores: 1,
+            machine_cores,
+            load,
+            ..Machine::default()
+        };
+        assert_eq!(machine(Some(5.0), Some(64)).busy(), None);
+        let told = machine(Some(40.0), Some(64)).busy().unwrap();
+        assert!(told.contains("40.0 on 64 cores"), "{told}");
+        // A report of before has those of the process alone.
+        assert!(machine(Some(5.0), None).busy().is_some());
+        let here = Machine::capture();
+        assert!(here.machine_cores >= Some(here.cores));
     }
 
     #[test]
