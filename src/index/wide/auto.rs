@@ -447,7 +447,7 @@ impl RegionIndex for Auto {
             return match &mut self.scan {
                 Some(scan) => scan.refit(items, moved),
                 None => {
-                    self.reserve = self.reserve_of(items);
+                    self.reserve = self.reserve.take().or_else(|| self.reserve_of(items));
                     self.refit_held(items, moved) || self.rebuild(items)
                 }
             };

@@ -342,7 +342,12 @@ fn a_scan_in_reserve_answers_from_the_second_update_on() {
     for (share, queries) in [(1, 1), (100, 1), (100, 200)] {
         let mut items = cubes(rng, 3_000);
         let mut index = built(&items, "");
-        assert!(index.refit(&items, &[]) && index.reserve.is_some());
+        let mut reserve = || {
+            assert!(index.refit(&items, &[]));
+            index.reserve.as_ref().map(|scan| scan.ids.as_ptr())
+        };
+        let first = reserve();
+        assert!(first.is_some() && reserve() == first, "not built again");
         for update in 0..3 {
             let moved: Vec<ItemId> = (0..items.len() as ItemId).step_by(share).collect();
             for &id in &moved {
