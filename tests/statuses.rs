@@ -139,6 +139,12 @@ mishaps! {
     Aborts "aborts" at_query std::process::abort();
     Panics "panics" at_query panic!("no such luck\nin two lines");
     PanicsChose "panics-chose" at_chose panic!("no choice");
+    // As a Ctrl-C that falls into a build.
+    Interrupts "interrupts" at_build {
+        let id = std::process::id().to_string();
+        let _ = Command::new("kill").args(["-INT", &id]).status();
+        std::thread::sleep(Duration::from_millis(200));
+    };
 }
 
 struct Stale;
@@ -316,6 +322,16 @@ fn ctrl_c_is_answered_at_once_in_the_middle_of_a_build() {
     assert_eq!(lines(), 2);
 }
 
+/// A check is stopped only if something is left out.
+fn ctrl_c_in_the_last_case_leaves_nothing_out() {
+    for (cases, code) in [("1", 0), ("2", 130)] {
+        let mut verify = program(Path::new("."));
+        verify.args(["verify", "--structure", "linear,interrupts", "--seed", "1"]);
+        let done = verify.args(["--cases", cases]).output().expect("started");
+        assert_eq!(done.status.code(), Some(code), "{cases}: {done:?}");
+    }
+}
+
 /// Hangs in every build but those of the first process.
 struct HangsLate;
 impl Mishap for HangsLate {
@@ -426,6 +442,7 @@ fn main() -> ExitCode {
     {
         a_limit_is_a_lack_of_memory();
         ctrl_c_is_answered_at_once_in_the_middle_of_a_build();
+        ctrl_c_in_the_last_case_leaves_nothing_out();
         a_resumed_run_does_not_try_again_what_has_ended_a_process();
     }
     println!("statuses: out_of_memory, timed_out, panicked, left_out; Ctrl-C; what fits");

@@ -5,6 +5,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
+static HEARD: AtomicBool = AtomicBool::new(false);
 static TO_FINISH: AtomicBool = AtomicBool::new(false);
 
 /// From now on the work looks at [`asked`] and leaves nothing half done.
@@ -17,9 +18,16 @@ pub fn from_now_on_finish() {
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// Returns true after a request to stop.
+/// Returns true after a request to stop: to be asked before work that it leaves out.
 pub fn asked() -> bool {
-    ASKED.load(Ordering::Relaxed)
+    let is_asked = ASKED.load(Ordering::Relaxed);
+    HEARD.fetch_or(is_asked, Ordering::Relaxed);
+    is_asked
+}
+
+/// Returns true if work was left out.
+pub fn heard() -> bool {
+    HEARD.load(Ordering::Relaxed)
 }
 
 /// # Errors

@@ -89,17 +89,14 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// Ending of a command that came to its end.
+    /// Ending of a command that came to its end, told if it left out checks.
+    ///
+    /// A wrong answer counts before that.
     fn of(is_right: bool) -> Ending {
-        Ending::of_checks(is_right, false)
-    }
-
-    /// Ending of checks, told if interrupted: a wrong answer counts before that.
-    fn of_checks(is_right: bool, interrupted: bool) -> Ending {
-        if interrupted {
+        if interrupt::heard() {
             tell!("interrupted: only the cases shown were checked");
         }
-        match (is_right, interrupted) {
+        match (is_right, interrupt::heard()) {
             (false, _) => Ending::WrongAnswer,
             (true, true) => Ending::Interrupted,
             (true, false) => Ending::Ok,

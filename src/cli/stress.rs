@@ -98,9 +98,11 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         }
         sections.extend(found);
     }
-    let interrupted = interrupt::asked();
     bar.finish_and_clear();
-    if !interrupted && by_others == 0 && sections.iter().all(|section| section.rows.is_empty()) {
+    if !interrupt::heard()
+        && by_others == 0
+        && sections.iter().all(|section| section.rows.is_empty())
+    {
         let files = args.vectors.iter().map(|file| file.display().to_string());
         let files = text::joined(files);
         bail!("{files}: nothing to check; expected planes, a camera or points in a vector");
@@ -116,7 +118,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     })?;
     let has_failed = |section: &Section| section.count(Status::Fail) > 0;
     let is_right = !sections.iter().any(has_failed);
-    Ok(Ending::of_checks(is_right, interrupted))
+    Ok(Ending::of(is_right))
 }
 
 /// Cases of each extreme by another instruction set than the chosen one.

@@ -73,7 +73,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
     let others = typed.words(|name| !own.contains(&name));
-    'scenes: for source in &scenes {
+    for source in scenes.iter().take_while(|_| !interrupt::asked()) {
         bar.set_message(text::plain(source));
         let scene = load_scene(source, &lens.scene_args.options(2 * structures.len()))?;
         skipped_items += scene.skipped_items;
@@ -81,14 +81,12 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             let build = |spec| Subject::build(spec, false, &scene, test);
             structures.iter().cloned().map(build).collect()
         });
-        for path in paths(args, &scene) {
+        let paths = paths(args, &scene).into_iter();
+        for path in paths.take_while(|_| !interrupt::asked()) {
             let cameras = path::load(&path, &scene, &defaults)?;
             let words = ["verify", "--scene", source, "--path", &path].map(str::to_owned);
             let again = command_line(&[&words[..], &others].concat());
             checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
-            if interrupt::asked() {
-                break 'scenes;
-            }
         }
         bar.inc(1);
     }
@@ -96,7 +94,6 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         bar.set_message(text::counted(cases as usize, "random case"));
         checks.extend(random_cases(&structures, seed, cases));
     }
-    let interrupted = interrupt::asked();
     bar.finish_and_clear();
     let outcome = Outcome {
         ok: checks.iter().all(|c| c.difference.is_none())
@@ -111,7 +108,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         checks,
     };
     print(args.format, &outcome, || show(&outcome))?;
-    Ok(Ending::of_checks(outcome.ok, interrupted))
+    Ok(Ending::of(outcome.ok))
 }
 
 /// Checks all structures, over boxes and over spheres, on the cameras of one path,
