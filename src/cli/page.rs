@@ -64,7 +64,7 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
     };
     let occurs = |name: &str| texts.iter().any(|text| is_of(text, name));
     let figures = run_table::OF_QUERIES.iter().chain(&run_table::OF_FRAMES);
-    let figures = figures.map(|(column, metric, _)| {
+    let figures = figures.map(|(column, metric)| {
         let info = METRICS.iter().find(|info| info.name == *metric);
         [*column, info.map_or("", |info| info.summary)]
     });

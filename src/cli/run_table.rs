@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use super::document::{Block, Table};
 use super::{scene_facts, text};
 use crate::culling::{Culling, CullingTest};
-use crate::measure::{CellKey, GroupKey, Status};
+use crate::measure::{CellKey, GroupKey, Metric, Status};
 use crate::path::CameraFacts;
 use crate::report::{Comparison, Overall, ReportCell, grouped, times_as_fast};
 use crate::spec::parse_number;
@@ -100,38 +100,47 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     lines.into_iter().filter(|line| !line.is_empty()).collect()
 }
 
-/// A column of single figures: head, metric and form.
-pub type Figure = (&'static str, &'static str, fn(f64) -> String);
+/// A column of single figures: head and metric.
+pub type Figure = (&'static str, &'static str);
 
 /// Figures of queries by priority; a summary has the first two.
 pub const OF_QUERIES: [Figure; 10] = [
-    ("build", "build_ms", |ms| text::time(ms * 1e6)),
-    ("bytes/item", "memory_bytes_per_item", |b| format!("{b:.1}")),
-    ("repaid after", "break_even_queries", |n| {
-        text::count(n as usize)
-    }),
-    ("p95", "query_ns_p95", text::time),
-    ("nodes tested", "nodes_tested", text::significant),
-    ("items tested", "items_tested", text::significant),
-    ("/ read", "times_read", text::significant),
-    ("/ copy", "times_memcpy", text::significant),
-    ("locate", "locate_ns", text::time),
-    ("update of 1 %", "update_ms", |ms| text::time(ms * 1e6)),
+    ("build", "build_ms"),
+    ("bytes/item", "memory_bytes_per_item"),
+    ("repaid after", "break_even_queries"),
+    ("p95", "query_ns_p95"),
+    ("nodes tested", "nodes_tested"),
+    ("items tested", "items_tested"),
+    ("/ read", "times_read"),
+    ("/ copy", "times_memcpy"),
+    ("locate", "locate_ns"),
+    ("update of 1 %", "update_ms"),
 ];
 
 /// Figures of frames, before the first two of queries.
 ///
 /// A summary of a motion has the first three and `x after 100`.
 pub const OF_FRAMES: [Figure; 8] = [
-    ("worst", "worst_frame_ns", text::time),
-    ("update", "update_ns", text::time),
-    ("query", "query_ns", text::time),
-    ("further query", "further_query_ns", text::time),
-    ("x after 1", "ageing_1", text::significant),
-    ("x after 10", "ageing_10", text::significant),
-    ("x after 100", "ageing_100", text::significant),
-    ("x after 1000", "ageing_1000", text::significant),
+    ("worst", "worst_frame_ns"),
+    ("update", "update_ns"),
+    ("query", "query_ns"),
+    ("further query", "further_query_ns"),
+    ("x after 1", "ageing_1"),
+    ("x after 10", "ageing_10"),
+    ("x after 100", "ageing_100"),
+    ("x after 1000", "ageing_1000"),
 ];
+
+/// A figure by its unit; a time in full has its interval.
+fn figure(metric: &Metric, is_full: bool) -> String {
+    match metric.unit.as_str() {
+        "ns" | "ms" if is_full => text::time_with(metric),
+        "ns" | "ms" => text::time_with(&Metric::of(Estimate::exact(metric.value), &metric.unit)),
+        "bytes" => format!("{:.1}", metric.value),
+        "queries" => text::count(metric.value as usize),
+        _ => text::significant(metric.value),
+    }
+}
 
 /// A row per structure of one scene and path.
 ///
@@ -162,7 +171,9 @@ pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) ->
             cell.time().map_or(status.clone(), text::time_with),
             text::some(speedup.filter(|_| is_ok), |found| ratio(found, is_full)),
         ];
-        let figure = |(_, metric, show): &Figure| text::some(cell.value(metric), show);
+        let figure = |(_, name): &Figure| {
+            text::some(cell.metrics.get(*name), |metric| figure(metric, is_full))
+        };
         let last = [
             text::some(of_peer.filter(|_| is_ok), text::significant),
             text::some((is_full && !is_ok).then_some(status), |status| status),

@@ -162,22 +162,25 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     }
 }
 
-/// A time with its uncertainty: "3.64 us ± 11 %".
+/// A time in ns or ms with its uncertainty: "3.64 us ± 11 %".
 ///
 /// A share where the interval is nearly symmetric in the logarithm, elsewhere its ends;
 /// nothing if one is not known.
 pub fn time_with(metric: &Metric) -> String {
-    let ends = metric.estimate().ends();
-    let logs = ends.map(|[lower, upper]| [metric.value / lower, upper / metric.value].map(f64::ln));
+    let ns = metric
+        .estimate()
+        .times([1.0, 1e6][usize::from(metric.unit == "ms")]);
+    let (value, ends) = (ns.value, ns.ends());
+    let logs = ends.map(|[lower, upper]| [value / lower, upper / value].map(f64::ln));
     let uncertainty = match logs {
         Some([below, above]) if (below - above).abs() <= 0.2 * above && above < 0.5 => {
             let percent = below.max(above).exp_m1() * 100.0;
             let digits = usize::from(percent < 1.0);
             format!(" ± {percent:.digits$} %")
         }
-        _ => interval(ends, unit(metric.value).0),
+        _ => interval(ends, unit(value).0),
     };
-    time(metric.value) + &uncertainty
+    time(value) + &uncertainty
 }
 
 /// A rate per `units` with its 95 % interval; nothing if there is none.
