@@ -15,7 +15,7 @@ use crate::index::Kind;
 use crate::path::evenly;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::scene::mix64;
-use crate::statistics::rate;
+use crate::statistics::{Estimate, rate_of};
 use crate::verify::{
     ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility, scan,
 };
@@ -189,12 +189,9 @@ pub fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item =
     evenly(queries, (most / items.max(1)).clamp(1, 16))
 }
 
-/// Sums over the queries that are judged.
+/// Errors of the queries that are judged.
 #[derive(Default)]
-pub(super) struct Judging {
-    sums: Judged,
-    by_query: Vec<[f64; 2]>,
-}
+pub(super) struct Judging(Vec<ErrorCount>);
 
 impl Judging {
     /// Compares the answer about items, `held` as the test has them, with the truth.
@@ -210,17 +207,15 @@ impl Judging {
         let view = workload.views[camera].as_any();
         let answer: Vec<ItemId> = scan(held, |b| view.sees(b)).collect();
         let errors = truth.errors(items, &answer);
-        self.sums.errors += blamed(workload.culling.test, errors);
-        self.sums.judged_queries += 1;
-        let of_query = [errors.false_positives as f64, errors.visible as f64];
-        self.by_query.push(of_query);
+        self.0.push(blamed(workload.culling.test, errors));
     }
 
     pub(super) fn judged(self) -> Judged {
-        let excess = rate(&self.by_query);
+        let excess = rate_of(&self.0, |e| [e.false_positives, e.visible]);
         Judged {
-            excess_interval: excess.and_then(|found| Some([found.lower?, found.upper?])),
-            ..self.sums
+            judged_queries: self.0.len(),
+            errors: self.0.into_iter().sum(),
+            excess_interval: excess.and_then(Estimate::ends),
         }
     }
 }

@@ -237,9 +237,6 @@ pub enum ExperimentError {
     /// A plan that measures nothing, or not what it says.
     #[error("the plan has {0}; expected one or more of everything, finite times, one process")]
     Plan(&'static str),
-    /// The name of a structure or a parameter of it is wrong.
-    #[error(transparent)]
-    Spec(#[from] crate::spec::SpecError),
 }
 
 /// The groups of one scene that one process measures, and what it starts from.

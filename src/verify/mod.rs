@@ -84,10 +84,7 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> Strin
 /// The same for region search.
 pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
     let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
-    let holds = match b.contains_point(p) {
-        true => "holds",
-        false => "does not hold",
-    };
+    let holds = ["does not hold", "holds"][usize::from(b.contains_point(p))];
     format!("box {min:?} to {max:?} {holds} the point {p:?}")
 }
 
