@@ -18,7 +18,9 @@ pub fn from_now_on_finish() {
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// Returns true after a request to stop: to be asked before work that it leaves out.
+/// Returns true after a request to stop.
+///
+/// For places before work that is then left out, of which [`heard`] tells.
 pub fn asked() -> bool {
     let is_asked = ASKED.load(Ordering::Relaxed);
     HEARD.fetch_or(is_asked, Ordering::Relaxed);
