@@ -17,7 +17,7 @@ use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
 use crate::input::InputError;
 use crate::motion::Motion;
-use crate::path::{self, LensDefaults};
+use crate::path::{self, CameraPath, LensDefaults};
 use crate::scene::{self, LoadOptions, Scene};
 
 /// Updates are measured in every n-th process, because they cost many builds.
@@ -281,7 +281,26 @@ pub fn measure_scene(
 ) -> Result<(), ExperimentError> {
     notice(None, "loading the scene");
     let scene = scene::load(&planned.source, &plan.load)?;
-    let info = SceneInfo::of(&scene);
+    let path = |name: &str, scale| path::load_scaled(name, &scene, &plan.lens, scale);
+    measure_loaded(plan, planned, share, (&scene, &path), keep, notice)
+}
+
+/// Cameras of a path by its name, and by the scale of far that is known of it.
+pub type PathOf<'a> = &'a dyn Fn(&str, Option<f64>) -> Result<CameraPath, InputError>;
+
+/// Measures one process's share of a scene that is there, as [`measure_scene`] does.
+///
+/// # Errors
+/// A path that cannot be read or made, a camera without a view.
+pub fn measure_loaded(
+    plan: &Plan,
+    planned: &PlannedScene,
+    share: &Share,
+    (scene, path_of): (&Scene, PathOf),
+    keep: &mut dyn FnMut(Part, Vec<TaskSamples>),
+    notice: Notice,
+) -> Result<(), ExperimentError> {
+    let info = SceneInfo::of(scene);
     let sweep = Machine::capture().cache_sweep_bytes();
     let mut built: Option<(bool, Vec<Subject>)> = None;
     for (n, (key, culling)) in plan.groups_of(planned).into_iter().enumerate() {
@@ -293,15 +312,15 @@ pub fn measure_scene(
         let of_spheres = culling.test == CullingTest::Sphere;
         // The old ones go first: memory for one set is enough.
         drop(built.take_if(|(kind, _)| *kind != of_spheres));
-        let build = || plan.subjects(&scene, culling.test, share, notice);
+        let build = || plan.subjects(scene, culling.test, share, notice);
         let (_, subjects) = built.get_or_insert_with(|| (of_spheres, build()));
         notice(None, &key.path);
         let scale = known.and_then(|known| known.lens_scale);
-        let path = path::load_scaled(&key.path, &scene, &plan.lens, scale)?;
+        let path = path_of(&key.path, scale)?;
         let motion = Some(&key.motion).filter(|motion| !motion.is_empty());
-        let motion = motion.map(|motion| Motion::load(motion, &scene));
+        let motion = motion.map(|motion| Motion::load(motion, scene));
         let (motion, views) = (motion.transpose()?, plan.views_per_frame);
-        let workload = Workload::moving(&scene, &path, &culling, motion, views)?;
+        let workload = Workload::moving(scene, &path, &culling, motion, views)?;
         let protocol = Protocol {
             rounds: plan.effort.rounds,
             task_ns: plan.effort.task_ns,

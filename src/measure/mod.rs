@@ -66,7 +66,10 @@ pub use clock::{Lap, Stopwatch};
 pub(crate) use count::blamed;
 pub use count::{Answer, Counted, Judged, count_pass, judge, spread};
 pub use environment::{Machine, Source, Toolchain};
-pub use experiment::{Effort, ExperimentError, Extras, Plan, PlannedScene, Share, measure_scene};
+pub use experiment::{
+    Effort, ExperimentError, Extras, PathOf, Plan, PlannedScene, Share, measure_loaded,
+    measure_scene,
+};
 pub use frames::measure;
 pub use group::{GroupPlan, NO_ITEMS};
 pub use index_under_test::{Built, Subject, move_share};

@@ -7,8 +7,11 @@ use super::Report;
 use super::stream::{Header, KeptPart, Stream, digits, utc};
 use crate::index::StructureSpec;
 use crate::measure::{
-    Effort, ExperimentError, Extras, Machine, Part, Plan, PlannedScene, Share, measure_scene,
+    Effort, ExperimentError, Extras, Machine, Notice, Part, Plan, PlannedScene, Share,
+    measure_loaded, measure_scene,
 };
+use crate::path::{self, CameraPath};
+use crate::scene::Scene;
 
 /// A plan that the calling process measures alone. Times have no intervals:
 /// those need several processes.
@@ -22,12 +25,30 @@ use crate::measure::{
 ///     .run()?;
 /// assert_eq!(report.cells[1].structure, "bvh");
 /// assert!(report.cells[1].value("query_ns") > Some(0.0));
+///
+/// // Boxes and cameras of your own, in memory.
+/// use cullbench::scene::WorldBox;
+/// use glam::DVec3;
+///
+/// let boxes = (0..99).map(|i| WorldBox::standing(DVec3::X * f64::from(4 * i), DVec3::ONE));
+/// let scene = Scene::from_boxes("row", &boxes.collect::<Vec<_>>())?;
+/// let frame = look_at(DVec3::new(-9.0, -30.0, 5.0), DVec3::ZERO, DVec3::Z)?;
+/// let lens = Lens::perspective(60.0, 1.5, 0.1, None)?;
+/// let path = CameraPath {
+///     name: "mine".to_owned(),
+///     cameras: vec![Camera { frame, lens }],
+///     ..CameraPath::default()
+/// };
+/// let bvh = Registry::builtin().structures("bvh")?;
+/// let report = Experiment::of(scene, path).structures(bvh).run()?;
+/// assert_eq!(report.cells[0].status, Status::Ok);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Experiment {
     /// The plan, for settings that have no method here.
     pub plan: Plan,
+    held: Option<(Scene, CameraPath)>,
 }
 
 impl Experiment {
@@ -38,6 +59,7 @@ impl Experiment {
     /// [`scene::load`]: crate::scene::load
     pub fn new(scene: &str) -> Experiment {
         Experiment {
+            held: None,
             plan: Plan {
                 scenes: vec![PlannedScene::new(scene, &[])],
                 structures: Vec::new(),
@@ -56,6 +78,15 @@ impl Experiment {
                 bounds: false,
                 seed: 1,
             },
+        }
+    }
+
+    /// An experiment on a scene and a path that are in memory; otherwise as [`Experiment::new`].
+    pub fn of(scene: Scene, path: CameraPath) -> Experiment {
+        let experiment = Experiment::new(&scene.name).path(&path.name);
+        Experiment {
+            held: Some((scene, path)),
+            ..experiment
         }
     }
 
@@ -94,7 +125,18 @@ impl Experiment {
                     ..KeptPart::default()
                 });
             };
-            measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| ())?;
+            let (plan, notice): (_, Notice) = (&self.plan, &|_, _| ());
+            let held = self.held.as_ref();
+            match held.filter(|(scene, _)| scene.name == planned.source) {
+                None => measure_scene(plan, planned, &share, &mut keep, notice)?,
+                Some((scene, own)) => {
+                    let path = |name: &str, scale| match name == own.name {
+                        true => Ok(own.clone()),
+                        false => path::load_scaled(name, scene, &plan.lens, scale),
+                    };
+                    measure_loaded(plan, planned, &share, (scene, &path), &mut keep, notice)?;
+                }
+            }
         }
         stream.finished_at = Some(utc(SystemTime::now()));
         Ok(stream.report())
