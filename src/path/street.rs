@@ -140,17 +140,16 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
     (0..DRAWN).map(place).collect()
 }
 
-/// Finds the ground of all columns, of half of them at a time if they pass through too many
-/// items. O((n + columns) log columns) where boxes are small.
+/// Finds the ground of all columns.
+///
+/// If they pass through too many items, half of them at a time.
+/// O((n + columns) log columns) where boxes are small.
 fn fill(stage: &Stage, columns: &mut [Column], room: f64) {
     if !pierce(stage, columns) {
-        columns
-            .iter_mut()
-            .for_each(|column| column.spans = Vec::new());
-        let halves = columns.split_at_mut(columns.len() / 2);
-        return <[_; 2]>::from(halves)
-            .into_iter()
-            .for_each(|half| fill(stage, half, room));
+        columns.iter_mut().for_each(|c| c.spans = Vec::new());
+        let (some, others) = columns.split_at_mut(columns.len() / 2);
+        fill(stage, some, room);
+        return fill(stage, others, room);
     }
     for column in columns {
         column.ground = column.level(room);

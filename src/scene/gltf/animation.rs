@@ -53,7 +53,7 @@ struct Motion {
     tracks: [Option<Arc<Track>>; 3],
 }
 
-/// Tracks by their input, output, width and interpolation: many channels may name one.
+/// Tracks by input, output, width and interpolation; many channels may name one.
 type Tracks = HashMap<[usize; 4], Arc<Track>>;
 
 #[derive(Clone, Debug)]
