@@ -1,4 +1,4 @@
-//! View-projection matrices in four conventions, as engines write them.
+//! View-projection matrices in eight conventions, as engines write them.
 //!
 //! Planes, corners and the eye are computed exactly from the entries and rounded once.
 
@@ -9,32 +9,49 @@ use crate::arithmetic::{Expansion, exact};
 use crate::geometry::{FrustumPlane, PlaneF64};
 
 named! {
-    /// How a matrix is to be read. Reversed depth needs no name: what is visible is
-    /// the same, and the plane before the eye is the near one.
+    /// How a matrix is to be read.
+    ///
+    /// One with an eye tells itself whether depth is reversed, under either name: the plane
+    /// before the eye is near. Without an eye (orthographic) only the name does.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
     #[non_exhaustive]
     pub enum MatrixConvention, MATRIX_CONVENTIONS {
         ColumnGl = "column-gl", "clip = M x, depth -1 to 1 (OpenGL)";
-        ColumnD3d = "column-d3d", "clip = M x, depth 0 to 1 or 1 to 0 (Vulkan, Metal, WebGPU)";
+        ColumnD3d = "column-d3d", "clip = M x, depth 0 to 1 (Vulkan, Metal, WebGPU)";
         RowGl = "row-gl", "clip = x M, depth -1 to 1";
-        RowD3d = "row-d3d", "clip = x M, depth 0 to 1 or 1 to 0 (Direct3D)";
+        RowD3d = "row-d3d", "clip = x M, depth 0 to 1 (Direct3D)";
+        ColumnGlReversed = "column-gl-reversed", "clip = M x, depth 1 to -1";
+        ColumnD3dReversed = "column-d3d-reversed", "clip = M x, depth 1 to 0";
+        RowGlReversed = "row-gl-reversed", "clip = x M, depth 1 to -1";
+        RowD3dReversed = "row-d3d-reversed", "clip = x M, depth 1 to 0";
     }
 }
 
+/// Differences of conventions, as bits of their place in the table.
+const FROM_ZERO: usize = 1;
+const BY_ROWS: usize = 2;
+const REVERSED: usize = 4;
+
 impl MatrixConvention {
+    const fn is(self, bit: usize) -> bool {
+        self as usize & bit != 0
+    }
+
     /// The convention with rows and columns exchanged.
     pub fn transposed(self) -> MatrixConvention {
-        // Rows follow columns, in the same order.
-        MATRIX_CONVENTIONS[(self as usize + 2) % 4].0
+        MatrixConvention::ALL[self as usize ^ BY_ROWS]
+    }
+
+    /// The convention with near and far exchanged.
+    pub fn reversed(self) -> MatrixConvention {
+        MatrixConvention::ALL[self as usize ^ REVERSED]
     }
 
     /// The entries by this convention as those for column vectors, or the reverse.
-    fn in_columns(self, entries: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
-        match self {
-            MatrixConvention::ColumnGl | MatrixConvention::ColumnD3d => entries,
-            MatrixConvention::RowGl | MatrixConvention::RowD3d => {
-                [0, 1, 2, 3].map(|i| entries.map(|row| row[i]))
-            }
+    pub(super) fn in_columns(self, entries: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+        match self.is(BY_ROWS) {
+            false => entries,
+            true => [0, 1, 2, 3].map(|i| entries.map(|row| row[i])),
         }
     }
 }
@@ -100,7 +117,7 @@ impl ViewProjection {
             CameraError::invalid("the matrix is singular", "one that has an inverse")
         })?;
         let eye;
-        (eye, matrix.is_reversed) = eye_of(&inverse);
+        (eye, matrix.is_reversed) = eye_of(&inverse, convention.is(REVERSED));
         matrix.is_parallel = eye.is_none();
         let sign = |corner| unprojected(&inverse, corner)[3].sign();
         let ahead = matrix.clip_corners().map(sign);
@@ -144,8 +161,7 @@ impl ViewProjection {
 
     /// Returns whether depth begins at 0, and not at -w.
     pub fn is_from_zero(&self) -> bool {
-        use MatrixConvention::{ColumnD3d, RowD3d};
-        matches!(self.convention, ColumnD3d | RowD3d)
+        self.convention.is(FROM_ZERO)
     }
 
     /// The planes in f64 about the sum of some points, of unit length: sums and
@@ -227,13 +243,14 @@ impl ViewProjection {
     }
 }
 
-/// The point that the projection takes to x = y = w = 0, and the sign of z there.
+/// The point that the projection takes to x = y = w = 0, and whether near is deep.
 ///
-/// Rounded; `None` at infinity. Where z is positive (`true`), depth is reversed: near has
-/// the larger one.
-fn eye_of(inverse: &[Four; 4]) -> (Option<DVec3>, bool) {
+/// The point is rounded; `None` at infinity. Where z is positive there, depth is reversed
+/// (`true`): near has the larger one. Where z is zero, the name of the convention decides.
+fn eye_of(inverse: &[Four; 4], by_name: bool) -> (Option<DVec3>, bool) {
     let eye = unprojected(inverse, [0.0, 0.0, 1.0, 0.0]);
-    let is_reversed = eye[3].sign() > 0;
+    let sign = eye[3].sign();
+    let is_reversed = sign > 0 || sign == 0 && by_name;
     // The same point, with a positive last coordinate.
     let eye = if is_reversed { eye } else { eye.map(|e| -&e) };
     (about(&eye, &[]).filter(|eye| eye.is_finite()), is_reversed)

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::matrix::{about, unprojected};
-use super::{Camera, CameraError, Lens, MatrixConvention, Pose, Result, ViewProjection, require};
+use super::{Camera, Lens, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
 /// A view whose depth is a smaller share of its distance from the eye counts as
@@ -61,7 +61,8 @@ impl ViewProjection {
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
         let image = [across, upward].map(DVec3::normalize);
         // Only Vulkan's clip space has y downward.
-        let up = match is_mirrored && self.convention() == MatrixConvention::ColumnD3d {
+        let is_of_vulkan = self.convention().name().starts_with("column-d3d");
+        let up = match is_mirrored && is_of_vulkan {
             true => -upward,
             false => upward,
         };
@@ -149,19 +150,10 @@ impl ViewProjection {
 }
 
 impl Camera {
-    /// Returns `true` for an orthographic matrix, mirrored or with reversed depth.
-    pub fn may_be_reversed(&self) -> bool {
-        let is_doubtful = |matrix: &ViewProjection| {
-            matrix.is_parallel && matrix.unprojected().is_ok_and(|found| found.is_mirrored)
-        };
-        self.lens.matrix().is_some_and(is_doubtful)
-    }
-
     /// This camera with a frame and a lens of its own, whose rays are known.
     ///
     /// # Errors
-    /// A matrix whose image is sheared or whose near plane is oblique; an orthographic
-    /// one that does not say which end is near.
+    /// A matrix whose image is sheared or whose near plane is oblique.
     pub fn unprojected(&self) -> Result<Camera> {
         let Some(matrix) = self.lens.matrix() else {
             return Ok(*self);
@@ -175,12 +167,6 @@ impl Camera {
             let rule = "at most 1e-5 where rays are needed, or another --matrix-convention";
             require(value <= STRAIGHT, found, rule)?;
         }
-        if matrix.is_from_zero() && self.may_be_reversed() {
-            return Err(CameraError::invalid(
-                "the orthographic matrix has reversed depth or a mirrored image, so either end may be near",
-                "eye_x.., look_x.. and ortho_height in its place",
-            ));
-        }
         Ok(found.camera)
     }
 }
@@ -188,26 +174,17 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::ClipSpace::{self, D3d, OpenGl, ReversedZ};
-    use crate::camera::{MatrixConvention, look_at};
+    use crate::camera::ClipSpace::{D3d, OpenGl, ReversedZ};
+    use crate::camera::MatrixConvention::{self, ColumnD3d, ColumnGl, RowD3d};
+    use crate::camera::{Frame, LensKind, look_at};
     use glam::{DMat4, DVec4};
 
     const EYE: DVec3 = DVec3::new(3.0, -2.0, 5.0);
 
     /// Reads a matrix as its user names it: by columns or, transposed, by rows.
-    fn read(matrix: DMat4, clip: ClipSpace, by_rows: bool) -> Camera {
-        let columns = matrix.to_cols_array_2d();
-        let (entries, convention) = match (by_rows, clip) {
-            (true, OpenGl) => (columns, MatrixConvention::RowGl),
-            (true, _) => (columns, MatrixConvention::RowD3d),
-            (false, clip) => {
-                let rows = matrix.transpose().to_cols_array_2d();
-                let is_gl = clip == OpenGl;
-                let names = [MatrixConvention::ColumnD3d, MatrixConvention::ColumnGl];
-                (rows, names[usize::from(is_gl)])
-            }
-        };
-        Camera::of_matrix(entries, convention).expect("a camera")
+    fn read(matrix: DMat4, convention: MatrixConvention) -> Camera {
+        let rows = matrix.transpose().to_cols_array_2d();
+        Camera::of_matrix(convention.in_columns(rows), convention).expect("a camera")
     }
 
     fn taken_apart(camera: &Camera) -> Unprojected {
@@ -240,85 +217,96 @@ mod tests {
         edges.map(relative).fold(depth, f64::max)
     }
 
+    /// Every lens, hand of the world (x mirrored is the left) and clip space.
+    ///
+    /// Each under the right name and under that of the other end of depth.
     #[test]
     fn a_matrix_is_the_camera_that_it_was_made_of() {
         let frame = look_at(EYE, DVec3::ZERO, DVec3::Z).unwrap();
-        for lens in lenses() {
-            for (clip, depths) in [
-                (OpenGl, [-1.0, 1.0]),
-                (D3d, [0.0, 1.0]),
-                (ReversedZ, [1.0, 0.0]),
-            ] {
-                let parallel = lens.is_orthographic();
-                if parallel && clip == ReversedZ {
-                    continue;
-                }
-                let matrix = lens.projection(clip) * frame.world_to_eye();
+        let clips = [
+            (ColumnGl, OpenGl, 1.0, [-1.0, 1.0]),
+            (ColumnGl.reversed(), OpenGl, -1.0, [1.0, -1.0]),
+            (ColumnD3d, D3d, 1.0, [0.0, 1.0]),
+            (ColumnD3d.reversed(), ReversedZ, 1.0, [1.0, 0.0]),
+        ];
+        for (lens, hand) in lenses().into_iter().flat_map(|l| [(l, 1.0), (l, -1.0)]) {
+            for (name, clip, turned, depths) in clips {
+                let change = DMat4::from_scale(DVec3::new(hand, 1.0, turned));
+                let matrix = change * lens.projection(clip) * frame.world_to_eye();
                 let rounded = matrix.to_cols_array().map(|entry| f64::from(entry as f32));
-                for (matrix, slack) in [
-                    (matrix, 1e-11),
-                    (matrix * 7.0, 1e-11),
-                    (DMat4::from_cols_array(&rounded), 1e-3),
-                ] {
-                    for by_rows in [false, true] {
-                        let read = read(matrix, clip, by_rows);
-                        let what = || format!("{lens:?} {clip:?} {slack}: {read:?}");
-                        assert_eq!(read.lens.is_orthographic(), parallel, "{}", what());
+                let rounded = DMat4::from_cols_array(&rounded);
+                for (matrix, slack) in [(matrix, 1e-11), (matrix * 7.0, 1e-11), (rounded, 1e-3)] {
+                    let other = name.reversed();
+                    for named in [name, name.transposed(), other, other.transposed()] {
+                        let read = read(matrix, named);
+                        let what = format!("{lens:?} {hand} {named:?} {slack}: {read:?}");
+                        check(&read, &lens, &frame, slack, &what);
+                        // Without an eye the name decides.
+                        let parallel = lens.is_orthographic();
+                        let is_swapped = parallel && ![name, name.transposed()].contains(&named);
                         let found = taken_apart(&read);
-                        assert_eq!(found.depths, depths, "{}", what());
-                        assert!(!found.is_mirrored && found.shear < 1e-5 && found.tilt < 1e-5);
-                        let camera = read.unprojected().expect("rays");
-                        assert_eq!(camera, found.camera);
-                        let own = &camera.frame;
-                        // The near plane's centre, of a lens that has no eye.
-                        let at = if parallel { lens.near() } else { 0.0 };
-                        let eye = frame.eye + frame.forward() * at;
-                        assert!(own.eye.distance(eye) < slack * 40.0, "{}", what());
-                        for (a, b) in [(own.u(), frame.u()), (own.n(), frame.n())] {
-                            assert!(a.distance(b) < slack, "{}", what());
-                        }
-                        let off = difference(&camera.lens, &lens);
-                        assert!(off < slack, "{}: {off:e}", what());
+                        let side = if is_swapped { -1.0 } else { 1.0 };
+                        let [near, far] = depths;
+                        let wanted = if is_swapped { [far, near] } else { depths };
+                        assert_eq!(found.depths, wanted, "{what}");
+                        assert_eq!(found.is_mirrored, hand * side < 0.0, "{what}");
+                        let along = found.camera.frame.forward() - frame.forward() * side;
+                        assert!(along.length() < slack, "{what}");
+                        let eye = match (parallel, is_swapped) {
+                            (false, _) => 0.0,
+                            (true, false) => lens.near(),
+                            (true, true) => lens.far().expect("an end"),
+                        };
+                        let eye = frame.eye + frame.forward() * eye;
+                        let off = found.camera.frame.eye.distance(eye);
+                        assert!(off < slack * 40.0, "{what}");
                     }
                 }
             }
         }
     }
 
+    /// The axes of the image up to their signs, the lens, and the camera of the rays.
+    fn check(read: &Camera, lens: &Lens, frame: &Frame, slack: f64, what: &str) {
+        let found = taken_apart(read);
+        assert!(found.shear < 1e-5 && found.tilt < 1e-5, "{what}");
+        assert_eq!(
+            read.lens.is_orthographic(),
+            lens.is_orthographic(),
+            "{what}"
+        );
+        let camera = read.unprojected().expect("rays");
+        assert_eq!(camera, found.camera);
+        let Camera {
+            frame: own,
+            lens: found,
+        } = camera;
+        let across = own.u().dot(frame.u());
+        for dot in [across, own.v().dot(frame.v()), own.n().dot(frame.n())] {
+            assert!((dot.abs() - 1.0).abs() < slack, "{what}");
+        }
+        let is_turned = across < 0.0 && matches!(lens.kind(), LensKind::OffAxis { .. });
+        let off = difference(&found, lens);
+        assert!(off < slack || is_turned, "{what}: {off:e}");
+    }
+
     #[test]
     fn a_mirrored_image_is_said_and_keeps_its_rays() {
         let frame = look_at(EYE, DVec3::ZERO, DVec3::Z).unwrap();
-        let [lens, .., parallel, _] = lenses();
+        let [lens, ..] = lenses();
         let flip = DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0));
-        for (clip, by_rows, up) in [(D3d, false, 1.0), (D3d, true, -1.0), (OpenGl, false, -1.0)] {
-            let camera = read(
-                flip * lens.projection(clip) * frame.world_to_eye(),
-                clip,
-                by_rows,
-            );
+        let names = [
+            (D3d, ColumnD3d, 1.0),
+            (D3d, RowD3d, -1.0),
+            (OpenGl, ColumnGl, -1.0),
+        ];
+        for (clip, convention, up) in names {
+            let matrix = flip * lens.projection(clip) * frame.world_to_eye();
+            let camera = read(matrix, convention);
             let found = taken_apart(&camera);
             assert!(found.is_mirrored);
             assert!((found.camera.frame.v() - frame.v() * up).length() < 1e-12);
             assert!(difference(&found.camera.lens, &lens) < 1e-12);
-        }
-        // Reversed depth and a mirrored image make the same matrix.
-        let unclear = read(
-            parallel.projection(ReversedZ) * frame.world_to_eye(),
-            ReversedZ,
-            false,
-        );
-        let error = unclear.unprojected().unwrap_err().to_string();
-        assert!(
-            error.contains("either end") && error.contains("ortho_height"),
-            "{error}"
-        );
-        // From -1 on there are rays, and a doubt.
-        let turned = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
-        for (change, is_doubtful) in [(DMat4::IDENTITY, false), (turned, true)] {
-            let matrix = change * parallel.projection(OpenGl) * frame.world_to_eye();
-            let camera = read(matrix, OpenGl, false);
-            assert_eq!(camera.may_be_reversed(), is_doubtful);
-            assert!(camera.unprojected().is_ok());
         }
     }
 
@@ -333,7 +321,7 @@ mod tests {
             ];
             let [x, y, z, w] = rows;
             let matrix = DMat4::from_cols(x, y, z, w).transpose();
-            let camera = read(matrix, OpenGl, false).unprojected().unwrap();
+            let camera = read(matrix, ColumnGl).unprojected().unwrap();
             let wanted = Lens::orthographic(40.0, 1.0, 0.0, 100.0).unwrap();
             assert!(camera.lens.is_orthographic(), "{far:e}");
             assert!(
@@ -358,7 +346,7 @@ mod tests {
             (sheared, "sheared by 8.7e-3; expected"),
             (oblique, "oblique by 2.0e-1; expected"),
         ] {
-            let camera = read(matrix * frame.world_to_eye(), OpenGl, false);
+            let camera = read(matrix * frame.world_to_eye(), ColumnGl);
             let error = camera.unprojected().unwrap_err().to_string();
             assert!(error.contains(wanted), "{error}");
         }

@@ -305,9 +305,13 @@ pub fn matrices(facts: &MatrixFacts) -> String {
     let [eye, right, up, forward] = vectors.map(|v| format!("({})", v.map(figure).join(", ")));
     let ([near, far], convention) = (facts.depth, &facts.convention);
     let mirrored = if facts.is_mirrored { ", mirrored" } else { "" };
+    let [by_name, at] = match facts.is_orthographic {
+        true => [" by this name", "centre of the near plane (as eye)"],
+        false => ["", "eye"],
+    };
     format!(
-        "{convention}, depth {near} to {far}{mirrored}; the first: eye {eye}, right {right}, up \
-         {up}, forward {forward}"
+        "{convention}, depth {near} to {far}{by_name}{mirrored}; the first: {at} {eye}, right \
+         {right}, up {up}, forward {forward}"
     )
 }
 

@@ -304,8 +304,8 @@ pub struct LensArgs {
     pub far: Option<f64>,
     /// Convention of cameras given as matrices (columns m00 to m33: row, column):
     /// column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d
-    /// (clip = x M); reversed depth (but not of an orthographic matrix) and infinite far
-    /// are recognised
+    /// (clip = x M); reversed depth and infinite far are recognised, but -reversed behind
+    /// the name tells of reversed depth of orthographic matrices
     #[arg(long, value_name = "NAME", value_parser = values::choice("matrix convention", &MATRIX_CONVENTIONS))]
     pub matrix_convention: Option<MatrixConvention>,
 }

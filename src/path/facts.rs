@@ -37,7 +37,12 @@ pub struct MatrixFacts {
     pub convention: String,
     /// Clip-space depth of the near and the far plane.
     pub depth: [f64; 2],
+    /// True for a matrix without an eye; the depths are those of the convention.
+    #[serde(default)]
+    pub is_orthographic: bool,
     /// Position of the camera, world coordinates.
+    ///
+    /// Without an eye the centre of the near plane.
     pub eye: [f64; 3],
     /// Direction to the right in the image.
     pub right: [f64; 3],
@@ -102,6 +107,7 @@ impl MatrixFacts {
         Some(MatrixFacts {
             convention: matrix.convention().name().to_owned(),
             depth: found.depths,
+            is_orthographic: found.camera.lens.is_orthographic(),
             eye,
             right,
             up,
@@ -168,7 +174,7 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
         rolled,
         unstraight,
         shallow,
-        mirrored,
+        upward_parallel,
         far_outside,
         blind,
     ];
@@ -222,13 +228,20 @@ fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// Orthographic matrices of which the near end is not certain.
-fn mirrored(_: &Scene, cameras: &[Camera]) -> Option<String> {
-    // Depths from 0 are refused where it matters.
-    let is_doubtful = |camera: &&Camera| camera.may_be_reversed() && camera.unprojected().is_ok();
+/// Orthographic matrices whose view would look down if near and far were swapped.
+fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    // Lights and maps are seen from above.
+    let is_doubtful = |camera: &&Camera| {
+        let is_matrix = camera.lens.matrix().is_some() && camera.lens.is_orthographic();
+        is_matrix && camera.frame.forward().dot(scene.up.vector()) > -0.1
+    };
+    let first = cameras.iter().find(is_doubtful)?.lens.matrix()?;
     let what = share_of(cameras, is_doubtful)?;
-    let found = format!("{what} orthographic and mirrored");
-    Some(found + "; if depth is reversed, near and far are swapped")
+    let other = first.convention().reversed().name();
+    Some(format!(
+        "{what} orthographic and not looking down; --matrix-convention {other} if near and far are \
+         swapped"
+    ))
 }
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.

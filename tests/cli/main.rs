@@ -32,6 +32,7 @@ mod matrices;
 mod memory;
 mod meshes;
 mod motion;
+mod near_ends;
 mod obj;
 mod page;
 mod pipes;
