@@ -12,7 +12,7 @@ use crate::statistics::{Estimate, rate_of};
 use crate::visibility::truth::{RayIndex, SampleTruth, SolidBox, SurfaceIndex};
 use crate::visibility::{Rays, SampleGrid, fragment};
 
-/// Samples that estimate how many items are in front at all samples.
+/// Samples that estimate how many surfaces are tested at all samples.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
 
 /// Tests of items by rays that take as long as a front item.
@@ -68,39 +68,35 @@ impl RaysEnd<'_> {
         samples: SampleGrid,
         threads: usize,
     ) -> Result<SampleTruth, String> {
-        let at_few = self.at_samples(rays, FEW, threads).samples_of;
-        let in_front = at_few.into_iter().map(u64::from).sum();
-        let tests = match self {
+        let tests_at_few = match self {
             RaysEnd::Boxes(index, _) => index.tests(rays, FEW),
             RaysEnd::Triangles(index) => index.tests(rays, FEW),
         };
         let most = most_drawn(samples);
         let most_tests = most * TESTS_PER_ITEM;
-        for (at_few, what, most, fewer) in [
-            (in_front, "front items", most, "with a common face"),
-            (tests, "surfaces to test", most_tests, "around the eye"),
-        ] {
-            let all = at_few * samples.samples() as u64 / FEW.samples() as u64;
-            if all > most {
-                return Err(format!(
-                    "about {all} {what}, summed over the samples; expected at most {most}: \
-                     fewer samples or fewer items {fewer}"
-                ));
-            }
+        let tests = tests_at_few * samples.samples() as u64 / FEW.samples() as u64;
+        let refused = |found: &str, most: u64, fewer: &str| {
+            format!(
+                "{found}, summed over the samples; expected at most {most}: fewer samples or \
+                 fewer items {fewer}"
+            )
+        };
+        if tests > most_tests {
+            let found = format!("about {tests} surfaces to test");
+            return Err(refused(&found, most_tests, "around the eye"));
         }
-        Ok(self.at_samples(rays, samples, threads))
-    }
-
-    fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
-        match self {
+        let truth = match self {
             RaysEnd::Boxes(index, holes) => {
                 let opaque = |body: &SolidBox, probe: &_, at: &_| {
                     holes.is_none_or(|holes| holes.opaque(body.item, &body.b, probe, at))
                 };
-                SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
+                SampleTruth::of_opaque(index, &opaque, rays, samples, threads, most)
             }
-            RaysEnd::Triangles(index) => SampleTruth::of(index, rays, grid, threads),
-        }
+            RaysEnd::Triangles(index) => {
+                SampleTruth::of_opaque(index, &|_, _, _| true, rays, samples, threads, most)
+            }
+        };
+        truth.ok_or_else(|| refused("too many front items", most, "with a common face"))
     }
 }
 

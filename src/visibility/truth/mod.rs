@@ -11,6 +11,8 @@ mod slabs;
 #[cfg(test)]
 pub(super) mod tests;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::query::ItemId;
 use crate::threads;
 use crate::visibility::{Rays, SampleGrid};
@@ -54,30 +56,39 @@ impl SampleTruth {
         grid: SampleGrid,
         threads: usize,
     ) -> SampleTruth {
-        SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads)
+        let all = SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads, u64::MAX);
+        all.expect("no limit")
     }
 
     /// Follows every ray through a scene of bodies with holes.
     ///
-    /// A ray ends at the first body that is opaque where the ray meets it.
+    /// A ray ends at the first body that is opaque where the ray meets it. `None`, early, if
+    /// `samples_of` would add up to more than `most`.
     pub fn of_opaque<B: Body>(
         index: &BodyIndex<B>,
         is_opaque: &(impl Fn(&B, &B::Probe, &B::At) -> bool + Sync),
         rays: &Rays,
         grid: SampleGrid,
         threads: usize,
-    ) -> SampleTruth {
+        most: u64,
+    ) -> Option<SampleTruth> {
         let width = grid.width as usize;
         let mut front = vec![NO_ITEM; grid.samples()];
         // Every visible item of a band but those in `front`.
         let mut others = vec![Vec::new(); (grid.height as usize).div_ceil(BAND)];
+        let seen_count = AtomicU64::new(0);
         let rows = front.chunks_mut((width * BAND).max(1)).zip(&mut others);
         threads::share(threads, rows.enumerate(), |(band, (front, others))| {
             let mut seen = Front::new();
             for (place, sample) in front.iter_mut().enumerate() {
+                if seen_count.load(Ordering::Relaxed) > most {
+                    return;
+                }
                 let (column, row) = (place % width, band * BAND + place / width);
                 let ray = rays.sample(grid, column as u32, row as u32);
                 seen.search(index, &ray, is_opaque);
+                let count = (seen.before.len() + seen.front.len()) as u64;
+                seen_count.fetch_add(count, Ordering::Relaxed);
                 others.extend_from_slice(&seen.before);
                 if let Some((first, ties)) = seen.front.split_first() {
                     others.extend_from_slice(ties);
@@ -85,16 +96,19 @@ impl SampleTruth {
                 }
             }
         });
+        if seen_count.into_inner() > most {
+            return None;
+        }
         let mut samples = vec![0u32; index.items];
         let seen = front.iter().copied().filter(|&item| item != NO_ITEM);
         seen.chain(others.into_iter().flatten())
             .for_each(|item| samples[item as usize] += 1);
         let counts = (0..).zip(samples);
         let (visible, samples_of) = counts.filter(|(_, count)| *count > 0).unzip();
-        SampleTruth {
+        Some(SampleTruth {
             front,
             visible,
             samples_of,
-        }
+        })
     }
 }

@@ -24,7 +24,8 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let solid = draw(&canvas, all(&solids), &Tests::default());
         let opaque =
             |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
-        let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1);
+        let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1, u64::MAX);
+        let truth = truth.expect("no limit");
         assert_eq!(drawn.visible(&canvas), truth.visible);
         let (ids, solid) = (drawn.ids(), solid.ids());
         assert_eq!(ids, truth.front);

@@ -3,7 +3,7 @@
 use super::judge;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, visible_by_random_rays};
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SolidBox, visible_by_random_rays};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 #[test]
@@ -107,6 +107,26 @@ fn the_same_on_any_number_of_threads_and_of_a_scene_far_from_zero() {
     }
     assert!(answers[0].visible.len() > 50);
     assert!(answers.iter().all(|answer| *answer == answers[0]));
+}
+
+/// Every item of a tie counts, wherever in the image it is.
+#[test]
+fn more_items_in_front_than_allowed_end_the_search() {
+    let frame = crate::camera::look_at(glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Z).unwrap();
+    let lens = crate::camera::Lens::perspective(90.0, 1.0, 1.0, None).unwrap();
+    let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
+    let (grid, at) = (SampleGrid::new(90, 90), glam::DVec3::new(3.0, 0.5, 0.0));
+    let one = crate::scene::WorldBox::around(at, glam::DVec3::new(0.1, 0.1, 9.0));
+    let index = RayIndex::build(&judge::solids(&[one; 100]));
+    for threads in [1, 3] {
+        let opaque = |_: &SolidBox, _: &_, _: &_| true;
+        let seen = |most| SampleTruth::of_opaque(&index, &opaque, &rays, grid, threads, most);
+        let all = seen(u64::MAX).expect("no limit");
+        let count: u64 = all.samples_of.iter().map(|n| u64::from(*n)).sum();
+        assert!(count > 9000 && count.is_multiple_of(100), "{count}");
+        assert_eq!(seen(count), Some(all));
+        assert_eq!([0, 5000, count - 1].map(seen), [None, None, None]);
+    }
 }
 
 #[test]
