@@ -42,30 +42,35 @@ impl Level {
             (false, Some(sample)) => sample.bytes.into(),
             (false, None) => return Ok(alone),
         };
+        // Meshes and boxes that lie in the same archive are no maps.
+        let is_map = |name: &String| {
+            let end = Path::new(name).extension();
+            end.is_none_or(|end| end.eq_ignore_ascii_case("bsp") || end.eq_ignore_ascii_case("wad"))
+        };
+        let mut maps = part_names(&bytes, file)?;
+        maps.retain(is_map);
+        let exact = maps.iter().position(|name| selected == Some(name));
+        let is_selected =
+            |name: &String| selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected));
+        let Some(own) = exact.or_else(|| maps.iter().rposition(is_selected)) else {
+            return Ok(alone);
+        };
+        let selected = maps.remove(own);
         // Notes on maps that were not selected are of no interest.
-        let sized = |name: String| {
+        let items_of = |name: String| {
             let read = || read_bytes(&bytes, [file, &name], Some(&name), options).ok();
             let mut map = unheard(read)?;
             if options.items == ItemKind::Triangles {
                 map = map.by_triangle(options).ok()?;
             }
-            Some((name, map.items.len()))
+            Some(map.items.len())
         };
-        let names = part_names(&bytes, file)?.into_iter();
-        let maps: Vec<(String, usize)> = names.filter_map(sized).collect();
-        let is_selected = |(name, _): &(String, usize)| {
-            selected.is_none_or(|selected| name.eq_ignore_ascii_case(selected))
-        };
-        let exact = |(name, _): &(String, usize)| selected == Some(&name[..]);
-        let own = maps.iter().position(exact);
-        let Some(own) = own.or_else(|| maps.iter().rposition(is_selected)) else {
-            return Ok(alone);
-        };
+        let others: Vec<usize> = maps.into_iter().filter_map(items_of).collect();
         Ok(Level {
-            map_count: maps.len(),
-            selected: maps[own].0.clone(),
-            input_count: maps.iter().map(|(_, items)| items).sum(),
-            output_count: maps[own].1,
+            map_count: 1 + others.len(),
+            selected,
+            input_count: alone.output_count + others.iter().sum::<usize>(),
+            ..alone
         })
     }
 }
@@ -108,40 +113,19 @@ mod tests {
     }
 
     #[test]
-    fn items_of_triangles_are_counted_as_such() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
-        let packed = scene::packed(&[("a.obj", square, 0), ("b.obj", square, 0)]);
-        let file = folder.path().join("two.zip");
-        std::fs::write(&file, packed).expect("written");
-        let options = LoadOptions {
-            items: ItemKind::Triangles,
-            ..LoadOptions::default()
-        };
-        let source = format!("{}#a.obj", file.display());
-        let scene = scene::load(&source, &options).expect("a scene");
-        let level = Level::of(&source, &scene, &options).expect("a level");
-        let counts = (level.input_count, level.output_count);
-        assert_eq!((scene.items.len(), counts), (2, (4, 2)));
-    }
-
-    #[test]
     fn names_may_differ_by_case_alone() {
         let folder = tempfile::tempdir().expect("a folder");
-        let rows = |count: usize| "0,0,0,1,1,1\n".repeat(count);
-        let csv = |count| format!("min_x,min_y,min_z,max_x,max_y,max_z\n{}", rows(count));
-        let entries = [("A.csv", csv(1)), ("a.csv", csv(7))];
-        let entries = entries
-            .each_ref()
-            .map(|(name, text)| (*name, text.as_bytes(), 0));
+        let maps = ["freedm-map12", "freedm-map20"].map(|name| Sample::named(name).unwrap());
+        let entries = [("A.wad", maps[0].bytes, 0), ("a.wad", maps[1].bytes, 0)];
         let file = folder.path().join("case.zip");
         std::fs::write(&file, scene::packed(&entries)).expect("written");
-        for (name, items) in [("A.csv", 1), ("a.csv", 7)] {
+        for (map, name) in maps.iter().zip(["A.wad", "a.wad"]) {
             let source = format!("{}#{name}", file.display());
-            let scene = scene::load(&source, &Default::default()).expect("boxes");
+            let scene = scene::load(&source, &Default::default()).expect("a map");
             let level = Level::of(&source, &scene, &Default::default()).expect("a level");
+            let items = map.load().expect("a map").items.len();
             assert_eq!((&level.selected[..], level.output_count), (name, items));
-            assert_eq!(scene.items.len(), items);
+            assert_eq!((scene.items.len(), level.map_count), (items, 2));
         }
     }
 
@@ -195,22 +179,39 @@ mod tests {
     #[test]
     fn levels_are_read_as_the_scene_was() {
         let map = include_bytes!("../../tests/data/two_rooms.bsp");
-        let maps = scene::packed(&[("maps/a.bsp", map, 0), ("maps/b.bsp", map, 0)]);
+        let square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+        let maps = scene::packed(&[
+            ("maps/a.bsp", map, 0),
+            ("maps/b.bsp", map, 0),
+            ("beside.obj", square, 0),
+        ]);
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("two.pk3");
         std::fs::write(&file, maps).expect("writable");
-        let source = &format!("{}#maps/b.bsp", file.display());
-        let items = scene::ItemKind::Brushes;
-        let options = LoadOptions {
-            items,
-            ..Default::default()
-        };
-        let scene = scene::load(source, &options).expect("a map");
-        let level = Level::of(source, &scene, &options).expect("a level");
-        assert_eq!(level.input_count, 2 * scene.items.len());
-        assert_eq!(level.output_count, scene.items.len());
-        let plain = Level::of(source, &scene, &Default::default()).expect("a level");
-        assert_ne!(plain.output_count, scene.items.len());
+        let mut counts = Vec::new();
+        for items in [ItemKind::default(), ItemKind::Brushes, ItemKind::Triangles] {
+            let options = LoadOptions {
+                items,
+                ..Default::default()
+            };
+            let level = |part: &str| {
+                let source = format!("{}#{part}", file.display());
+                let scene = scene::load(&source, &options)?;
+                Ok::<_, InputError>((Level::of(&source, &scene, &options)?, scene.items.len()))
+            };
+            let (of_map, items) = level("maps/b.bsp").expect("a level");
+            assert_eq!((of_map.map_count, of_map.output_count), (2, items));
+            assert_eq!(of_map.input_count, 2 * items);
+            // What is no map is not counted.
+            if let Ok((of_mesh, items)) = level("beside.obj") {
+                assert_eq!((of_mesh.map_count, of_mesh.input_count), (1, items));
+            }
+            counts.push(items);
+        }
+        assert!(
+            counts[0] != counts[1] && counts[1] != counts[2],
+            "{counts:?}"
+        );
     }
 
     #[test]
