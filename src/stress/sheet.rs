@@ -8,7 +8,7 @@ use super::{Level, Name, Names, Row, Said, Status, Vector};
 use glam::DVec3;
 
 use crate::arithmetic::Expansion;
-use crate::camera::{Camera, Lens, LensKind, Surroundings};
+use crate::camera::{Camera, Lens, Surroundings};
 use crate::culling::CullingTest;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, DynIndex, caught};
@@ -51,18 +51,12 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
 /// The determinant of near's, a side's and the bottom's or top's normals: what
 /// is left when the three make a bound along an axis.
 fn openness(lens: &Lens) -> f64 {
-    let slopes = match *lens.kind() {
-        LensKind::Perspective { fovy_deg, aspect } => {
-            let y = libm::tan(fovy_deg.to_radians() / 2.0);
-            [y * aspect, y]
-        }
-        LensKind::OffAxis { window } => {
-            let [left, right, bottom, top] = window.map(|edge| edge.abs() / lens.near());
-            [left.max(right), bottom.max(top)]
-        }
-        // Matrices are not drawn here.
-        LensKind::Orthographic { .. } | LensKind::Matrix(_) => [0.0; 2],
-    };
+    // Matrices are not drawn here.
+    if lens.is_orthographic() || lens.matrix().is_some() {
+        return 1.0;
+    }
+    let [left, right, bottom, top] = lens.window().map(f64::abs);
+    let slopes = [left.max(right), bottom.max(top)];
     slopes.map(|s| 1.0 / libm::hypot(1.0, s)).iter().product()
 }
 
