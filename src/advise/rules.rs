@@ -238,7 +238,7 @@ fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Find
         _ => name == stage.name(),
     };
     let own = gain(stage).ok_or_else(|| {
-        let row = left_out.find(|row| is_own(row.section, row.name));
+        let row = left_out.find(|row| is_own(row.section, &row.name));
         let none = "the scene has no rooms or sectors that portals join";
         row.map_or(none, |row| &row.reason).to_owned()
     })?;

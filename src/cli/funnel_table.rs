@@ -75,7 +75,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     let left_out = report.left_out.iter();
     let left_out = left_out.filter(|row| all || row.section == "stages");
     blocks.extend(left_out.map(|row| {
-        let (section, name, reason) = (row.section, row.name, &row.reason);
+        let (section, name, reason) = (row.section, &row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));
     // Notes about other back ends are shown with them only.

@@ -18,17 +18,17 @@ pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), InputError> {
 pub struct LeftOutRow {
     /// The section: `stages`, `orders` or `picks`.
     pub section: &'static str,
-    /// The back end, the stage of which all are left out, or `all` of the section.
-    pub name: &'static str,
+    /// A back end, a structure, a stage without any, or `all` of the section.
+    pub name: String,
     /// The reason, as a sentence without its period.
     pub reason: String,
 }
 
 impl LeftOutRow {
-    pub(super) fn new([section, name]: [&'static str; 2], reason: impl ToString) -> LeftOutRow {
+    pub(super) fn new(section: &'static str, name: &str, reason: impl ToString) -> LeftOutRow {
         LeftOutRow {
             section,
-            name,
+            name: name.to_owned(),
             reason: reason.to_string(),
         }
     }

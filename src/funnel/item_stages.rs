@@ -42,7 +42,7 @@ impl World<'_> {
     }
 
     fn run_object(&self, name: &str) -> Run<'_> {
-        let found = self.structures.iter().find(|(label, _)| label == name);
+        let found = self.structures.iter().find(|(spec, _)| spec.label == name);
         let (_, index) = found.expect("a structure that was built");
         let state = RefCell::new((IdSet::default(), Vec::new()));
         Box::new(move |view, input, out| {

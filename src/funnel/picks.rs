@@ -13,6 +13,7 @@ use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use super::world::{Shape, World};
 use crate::camera::Surroundings;
 use crate::geometry::ConvexVolume;
+use crate::index::Kind;
 use crate::measure::Ask;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
@@ -111,7 +112,8 @@ impl<'w> Picks<'w> {
         let bodies = all.all.len();
         for row in Bodies::<B>::BACK_ENDS {
             if row.name == "linear" && bodies > MOST_FOR_LOOP {
-                self.left_out.push(too_many(bodies, one, "for each ray"));
+                let row = too_many(row.name, bodies, one, "for each ray");
+                self.left_out.push(row);
                 continue;
             }
             let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.world.kernel));
@@ -139,9 +141,11 @@ impl<'w> Picks<'w> {
     /// Adds structures of the object stage, by the frusta of the cursors.
     fn add_frusta(&mut self) {
         let world = self.world;
-        for (label, index) in &world.structures {
-            if label == "linear" && world.items() > MOST_FOR_LOOP {
-                let row = too_many(world.items(), "item", "for each cursor's frustum");
+        for (spec, index) in &world.structures {
+            let is_loop = spec.row.info.kind == Kind::Scan;
+            if is_loop && world.items() > MOST_FOR_LOOP {
+                let when = "for each cursor's frustum";
+                let row = too_many(&spec.label, world.items(), "item", when);
                 self.left_out.push(row);
                 continue;
             }
@@ -152,7 +156,7 @@ impl<'w> Picks<'w> {
             });
             let declared = PickRow {
                 question: PickQuestion::Through,
-                name: label.clone(),
+                name: spec.label.clone(),
                 summary: "the six-plane test of the cursor's frustum by a structure",
                 guarantee: Guarantee::Conservative,
                 ..PickRow::default()
@@ -221,10 +225,10 @@ impl<'w> Picks<'w> {
 }
 
 /// The plain loop as left out.
-fn too_many(bodies: usize, one: &str, when: &str) -> LeftOutRow {
+fn too_many(name: &str, bodies: usize, one: &str, when: &str) -> LeftOutRow {
     let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
     let reason = format!("{found} to test {when}; expected at most {most}");
-    LeftOutRow::new(["picks", "linear"], reason)
+    LeftOutRow::new("picks", name, reason)
 }
 
 /// Cursors at the centres of a grid over the image.

@@ -186,12 +186,12 @@ pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
         Regions::Bsp(map) => map,
         Regions::Leaves(map) if map.sees().is_none() => {
             let reason = "the map has no table of which cluster sees which";
-            return Some(LeftOutRow::new(["stages", "stored-pvs"], reason));
+            return Some(LeftOutRow::new("stages", "stored-pvs", reason));
         }
         _ => return None,
     };
     if let Some(dispute) = map.disputes().first() {
-        return Some(LeftOutRow::new(["stages", "region"], dispute));
+        return Some(LeftOutRow::new("stages", "region", dispute));
     }
     let (bytes, sectors) = (map.reject.len(), map.sectors.len());
     let least = sectors.saturating_mul(sectors).div_ceil(8);
@@ -199,7 +199,7 @@ pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     let reason = format!("REJECT of {found} for {of}, expected {}", count(least));
     // Map builders leave it empty.
     let is_short = (1..least).contains(&bytes);
-    is_short.then(|| LeftOutRow::new(["stages", "reject"], reason))
+    is_short.then(|| LeftOutRow::new("stages", "reject", reason))
 }
 
 /// Back ends of a stage that a scene can have, without structures.

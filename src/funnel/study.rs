@@ -191,9 +191,9 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     }
     let mut left_out = Vec::from_iter(left_out_of(scene));
     if let Some(reason) = &study.fragments.too_much {
-        left_out.push(LeftOutRow::new(["stages", "fragment"], reason));
+        left_out.push(LeftOutRow::new("stages", "fragment", reason));
         let orders = (input.all || input.sorted).then_some("orders");
-        left_out.extend(orders.map(|orders| LeftOutRow::new([orders, "all"], reason)));
+        left_out.extend(orders.map(|orders| LeftOutRow::new(orders, "all", reason)));
     }
     let mut orders = Vec::new();
     if let Some(all) = &study.orders {
@@ -207,7 +207,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         left_out.extend_from_slice(&all.left_out);
     } else if input.all {
         let reason = "not asked for: --no-picks";
-        left_out.push(LeftOutRow::new(["picks", "all"], reason));
+        left_out.push(LeftOutRow::new("picks", "all", reason));
     }
     let mut gains = study.gains(&rows);
     gains.extend(study.gain_of_sorting(&orders).filter(|_| input.sorted));

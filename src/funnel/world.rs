@@ -137,7 +137,7 @@ pub struct World<'a> {
     pub hiders: Hiders,
     pub regions: Option<Regions>,
     /// Structures of the object stage under their labels.
-    pub structures: Vec<(String, Box<dyn DynIndex>)>,
+    pub structures: Vec<(&'a StructureSpec, Box<dyn DynIndex>)>,
     /// The chain whose back ends are the only ones; `None` for all.
     only: Option<Chain>,
 }
@@ -161,7 +161,7 @@ impl<'a> World<'a> {
         begin("structures");
         let built = input.structures.iter().map(|spec| {
             let index = spec.build(input_of(scene, &scene.items))?;
-            Ok::<_, BuildError>((spec.label.clone(), index))
+            Ok::<_, BuildError>((spec, index))
         });
         let structures = built.collect::<Result<_, _>>()?;
         let mut cut_outs = None;
@@ -256,7 +256,7 @@ impl<'a> World<'a> {
 
     /// Back ends of a stage that are compared, each with its name or its structure's.
     pub fn rows(&self, stage: StageKind) -> Vec<(BackEnd, String)> {
-        let labels = self.structures.iter().map(|(label, _)| label);
+        let labels = self.structures.iter().map(|(spec, _)| &spec.label);
         let mut rows = rows(self.back_ends(stage), self.regions.as_ref(), labels);
         if let Some(chain) = &self.only {
             rows.retain(|(_, name)| chain.of(stage) == name);

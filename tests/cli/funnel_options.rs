@@ -143,15 +143,22 @@ fn unused_options_and_large_loops_are_named() {
                 --no-picks";
     let told = cullbench(Path::new("."), line).err;
     assert!(told.contains("note: --no-picks has no effect"), "{told}");
-    let line = "funnel --scene city:n=20001 --path street:frames=1 --samples 16x9 --processes 1 \
-                --format json";
-    let report = json(&works(Path::new("."), line));
-    let rows = array(&report, "left_out").iter();
-    let loops: Vec<_> = rows.filter(|row| row["name"] == "linear").collect();
-    assert_eq!(loops.len(), 2, "{loops:?}");
-    let reason = loops[0]["reason"].as_str().unwrap();
-    assert_eq!(
-        reason,
-        "20,001 items to test for each ray; expected at most 20,000"
-    );
+    for (structures, scan) in [
+        ("", "linear"),
+        ("--structure linear-scalar,bvh", "linear-scalar"),
+    ] {
+        let line = format!(
+            "funnel --scene city:n=20001 --path street:frames=1 --samples 16x9 --processes 1 \
+             --format json {structures}"
+        );
+        let report = json(&works(Path::new("."), &line));
+        let rows = array(&report, "left_out").iter();
+        let rows = rows.filter(|row| row["section"] == "picks");
+        let loops: Vec<_> = rows.map(|row| (&row["name"], &row["reason"])).collect();
+        let told = |when| format!("20,001 items to test {when}; expected at most 20,000");
+        let [of_ray, of_cursor] = ["for each ray", "for each cursor's frustum"].map(told);
+        let (of_ray, of_cursor) = (of_ray.into(), of_cursor.into());
+        let wanted = [(&"linear".into(), &of_ray), (&scan.into(), &of_cursor)];
+        assert_eq!(loops, wanted);
+    }
 }
