@@ -206,9 +206,11 @@ pub enum Fate {
     Lost,
 }
 
-/// The first view with the fate of each item.
+/// The view that sees most items, with the fate of each.
 #[derive(Clone, Default, Debug)]
 pub struct PlanView {
+    /// Number of views that it is chosen from.
+    pub of: usize,
     /// Its camera; `None` if there is no view.
     pub camera: Option<Camera>,
     /// Fates by item.
@@ -216,19 +218,22 @@ pub struct PlanView {
 }
 
 impl PlanView {
-    /// The first view, behind the stages of whole items of a chain.
+    /// The first of the views that see most, behind the stages of whole items of a chain.
     pub fn of(world: &World, stages: &ItemStages, chain: &Chain, truth: &Truth) -> PlanView {
-        let (Some(view), Some(visible)) = (world.views.first(), truth.first()) else {
+        let both = world.views.iter().zip(truth).enumerate();
+        let most = both.rev().max_by_key(|(_, (_, visible))| visible.len());
+        let Some((place, (view, visible))) = most else {
             return PlanView::default();
         };
         let left = StageKind::OF_ITEMS.map(|stage| {
             let steps = chain.steps_with(stage, chain.of(stage));
-            (stage, stages.items(&steps, 0))
+            (stage, stages.items(&steps, place))
         });
         let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
         let items = (0..).take(world.scene.items.len());
         let fates = items.map(|item| fate(item, &left, is_visible(item)));
         PlanView {
+            of: world.views.len(),
             camera: Some(view.rays.camera),
             fates: fates.collect(),
         }

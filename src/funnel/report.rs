@@ -62,7 +62,7 @@ pub struct FunnelReport {
     pub conclusions: Vec<String>,
     /// Warnings about the cameras in the scene.
     pub warnings: Vec<String>,
-    /// The first view from above.
+    /// The view that sees most, from above.
     #[serde(skip)]
     pub plan_view: PlanView,
 }
@@ -263,8 +263,10 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
             significant(report.stages[0].errors.truth_count)
         )
     });
+    let inner = report.inner_boxes.as_ref();
+    let none_closed = inner.is_some_and(|inner| inner.boxed_count == 0);
     let gains = report.gains.iter();
-    let gains = gains.filter_map(|gain| of_gain(gain, &report.stages));
+    let gains = gains.filter_map(|gain| of_gain(gain, &report.stages, none_closed));
     let told: Vec<String> = last.into_iter().chain(gains).collect();
     let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
@@ -275,7 +277,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
 /// A sentence on a stage; lost visible items are no savings.
 ///
 /// None on the depth test, which costs a GPU next to nothing.
-fn of_gain(gain: &Gain, stages: &[StageRow]) -> Option<String> {
+fn of_gain(gain: &Gain, stages: &[StageRow], none_closed: bool) -> Option<String> {
     if gain.stage == StageKind::Fragment {
         return None;
     }
@@ -292,13 +294,24 @@ fn of_gain(gain: &Gain, stages: &[StageRow]) -> Option<String> {
             significant(errors.false_negative_count)
         ));
     }
-    Some(match gain.break_even {
-        None if gain.removed() > 0.0 => return None,
-        None => format!("{what} is not needed: it removes nothing that the other stages leave."),
-        Some(ns) if ns.upper.unwrap_or(ns.value) == 0.0 => {
+    let is_occlusion = gain.stage == StageKind::Occlusion;
+    let hidden = errors.map(|errors| errors.output_count - errors.truth_count);
+    Some(match (gain.break_even, hidden.filter(|_| is_occlusion)) {
+        (None, _) if gain.removed() > 0.0 => return None,
+        // What nothing is found to hide may well be hidden.
+        (None, Some(hidden)) if hidden > 0.0 => {
+            let why = ["", ": no item is closed, so none is an occluder"];
+            let why = why[usize::from(none_closed)];
+            let hidden = significant(hidden);
+            format!("{what} removes nothing, though {hidden} of the items left are hidden{why}.")
+        }
+        (None, _) => {
+            format!("{what} is not needed: it removes nothing that the other stages leave.")
+        }
+        (Some(ns), _) if ns.upper.unwrap_or(ns.value) == 0.0 => {
             format!("Use {what}: it saves time as well.")
         }
-        Some(ns) => {
+        (Some(ns), _) => {
             // Within noise of saving time as well.
             let most = ns.upper.filter(|_| ns.lower == Some(0.0));
             let within = most.map_or_else(String::new, |most| format!(" (0 to {})", time(most)));
@@ -355,7 +368,8 @@ mod tests {
             });
             gain
         };
-        let advice = |value, lower, upper| of_gain(&gain(value, lower, upper), &[]).expect("one");
+        let advice =
+            |value, lower, upper| of_gain(&gain(value, lower, upper), &[], false).expect("one");
         let wanted = "Use region (portals) if drawing one item takes more than 350 ns";
         assert_eq!(
             advice(350.0, 0.0, 734.0),
@@ -378,14 +392,25 @@ mod tests {
         };
         let own = lossy(StageKind::Region, 5.0);
         assert_eq!(
-            of_gain(&gain(350.0, 300.0, 734.0), &[own]).expect("one"),
+            of_gain(&gain(350.0, 300.0, 734.0), &[own], false).expect("one"),
             "region (portals) removes 6.00 items per view, 5.00 of them visible."
         );
         // The loss of another stage is not its own.
         let other = lossy(StageKind::Occlusion, 5.0);
-        let own = of_gain(&gain(350.0, 300.0, 734.0), &[other]);
+        let own = of_gain(&gain(350.0, 300.0, 734.0), &[other], false);
         assert_eq!(own.expect("one"), format!("{wanted}."));
         assert!(advice(0.0, 0.0, 9.0).ends_with("more than 0 ns (0 to 9.00 ns)."));
         assert!(advice(0.0, 0.0, 0.0).ends_with("saves time as well."));
+        // What is not found to be hidden is not "not needed".
+        let named = |stage| Gain::new(stage, ("masked", "items"), [3.0; 2], [vec![], vec![]]);
+        let row = |truth_count| {
+            let mut row = lossy(StageKind::Occlusion, 0.0);
+            row.errors.truth_count = truth_count;
+            of_gain(&named(StageKind::Occlusion), &[row], true).expect("one")
+        };
+        let wanted = "occlusion (masked) removes nothing, though 2.00 of the items left are hidden: \
+            no item is closed, so none is an occluder.";
+        assert_eq!(row(1.0), wanted);
+        assert!(row(3.0).contains("is not needed"));
     }
 }
