@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 
 use super::args::ReportArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
-use super::document::{Block, Column, Table, to_html, to_markdown};
+use super::document::{Block, Column, Table, show, to_html, to_markdown};
 use super::figure::{Axis, ends, is_drawn};
 use super::page::{glossary, origin};
 use super::run_table::{self, distinct, name, question};
@@ -70,7 +70,10 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
         let folder = if path.is_dir() { path } else { folder_of(path) };
         write_text(file, &page(&report, folder, Vec::new()))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
-        io::stdout().write_all(markdown().as_bytes())?;
+        match io::stdout().is_terminal() {
+            true => show(&shown(&report, false, text::width()))?,
+            false => io::stdout().write_all(markdown().as_bytes())?,
+        }
     }
     Ok(Ending::Ok)
 }

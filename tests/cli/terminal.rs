@@ -120,6 +120,11 @@ fn runs_and_comparisons_fit() {
     );
     assert!(told.contains("linear takes "), "{told}");
     assert_fits(folder.path(), &format!("{one} --out three --all-columns"));
+    // A terminal gets the tables of the run, a pipe Markdown; a wide one more columns.
+    assert_fits(folder.path(), "report one");
+    assert!(works(folder.path(), "report one").starts_with("# cullbench run "));
+    let wide = in_terminal(folder.path(), "report one", 120).0;
+    assert!(wide.contains("bytes/item  repaid after"), "{wide}");
     for more in ["", "--all", "--gate work --all"] {
         assert_fits(
             folder.path(),
