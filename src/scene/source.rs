@@ -6,6 +6,8 @@
 use std::fs;
 use std::path::Path;
 
+use serde::de::IgnoredAny;
+
 use super::generate::{Build, COUNT, MOST};
 use super::gltf::{self, Beside, beside, is_gltf};
 use super::ibsp::{is_ibsp, read_ibsp};
@@ -238,6 +240,11 @@ fn read_beside(
             false => read_obj(bytes, file, name, options),
         };
     }
+    // UTF-16 has an error of its own.
+    if bytes.iter().take(32).any(|byte| *byte == 0) && !bytes.starts_with(b"\xff\xfe") {
+        let found = "a binary file of no known format";
+        return Err(InputError::byte(file, 0, found, READ));
+    }
     let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     options.check_fits(name, Some(rows), 0)?;
     let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
@@ -268,38 +275,34 @@ impl Sample {
 const MESH: &str = "glTF or OBJ exported from it, or its boxes as CSV (docs/CAPTURE.md)";
 const POINTS: &str = "its objects as boxes CSV (docs/CAPTURE.md)";
 const TILES: &str = "its tiles as glTF, or their boxes as CSV (docs/CAPTURE.md)";
-const PACKED: &str = "the file that is compressed in it";
+const PACKED: &str = "the file that is packed in it";
 const OWN_MAP: &str = "the BSP map that it belongs to";
-const PICTURE: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
+const READ: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
 
-/// Name, beginning (none: told by the extension alone), extension, and what to do.
-const FORMATS: [(&str, &[u8], &str, &str); 26] = [
-    ("STL", b"", "stl", MESH),
-    ("PLY", b"ply\n", "ply", MESH),
-    ("PLY", b"ply\r", "ply", MESH),
-    ("FBX", b"Kaydara FBX", "fbx", MESH),
-    ("FBX", b"; FBX", "fbx", MESH),
-    ("USD", b"#usda", "usda", MESH),
-    ("USD", b"PXR-USDC", "usdc", MESH),
-    ("USD", b"", "usd", MESH),
-    ("USDZ", b"", "usdz", MESH),
-    ("Blender", b"BLENDER", "blend", MESH),
-    ("IFC", b"ISO-10303-21", "ifc", MESH),
-    ("Collada", b"<?xml", "dae", MESH),
-    ("LAS", b"LASF", "las", POINTS),
-    ("LAZ", b"", "laz", POINTS),
-    ("OpenStreetMap PBF", b"", "pbf", POINTS),
-    ("3D Tiles", b"b3dm", "b3dm", TILES),
-    ("3D Tiles", b"i3dm", "i3dm", TILES),
-    ("3D Tiles", b"pnts", "pnts", TILES),
-    ("3D Tiles", b"cmpt", "cmpt", TILES),
-    ("PNG", b"\x89PNG", "png", PICTURE),
-    ("JPEG", b"\xff\xd8\xff", "jpg", PICTURE),
-    ("Cube 2 map", b"", "ogz", MESH),
-    ("Quake PACK", b"PACK", "pak", "a Quake III map from a pk3"),
-    ("AAS (bot paths)", b"EAAS", "aas", OWN_MAP),
-    ("gzip", b"\x1f\x8b", "gz", PACKED),
-    ("Zstandard", b"\x28\xb5\x2f\xfd", "zst", PACKED),
+/// Name (none: its extension), beginnings, extensions in capitals, and what to do.
+const FORMATS: [(&str, &[&[u8]], &str, &str); 22] = [
+    ("", &[], "3DS 3MF ASE B3D DXF LWO OFF STL", MESH),
+    ("", &[], "TSCN UASSET UNITY USDZ VOX WRL X", MESH),
+    ("", &[], "E57 LAZ PARQUET PCD", POINTS),
+    ("PLY", &[b"ply\n", b"ply\r"], "PLY", MESH),
+    ("FBX", &[b"Kaydara FBX", b"; FBX"], "FBX", MESH),
+    ("USD", &[b"#usda", b"PXR-USDC"], "USD USDA USDC", MESH),
+    ("Blender", &[b"BLENDER"], "BLEND", MESH),
+    ("IFC", &[b"ISO-10303-21"], "IFC", MESH),
+    ("LAS", &[b"LASF"], "LAS", POINTS),
+    ("OpenStreetMap PBF", &[], "PBF", POINTS),
+    ("3D Tiles", &[b"b3dm", b"i3dm"], "B3DM I3DM", TILES),
+    ("3D Tiles", &[b"pnts", b"cmpt"], "PNTS CMPT", TILES),
+    ("PNG", &[b"\x89PNG"], "PNG", READ),
+    ("JPEG", &[b"\xff\xd8\xff"], "JPG JPEG", READ),
+    ("Cube 2 map", &[], "OGZ", MESH),
+    ("Quake PACK", &[b"PACK"], "PAK", "a Quake III map of a pk3"),
+    ("Quake editor map", &[], "MAP", OWN_MAP),
+    ("AAS (bot paths)", &[b"EAAS"], "AAS", OWN_MAP),
+    ("gzip", &[b"\x1f\x8b"], "GZ", PACKED),
+    ("Zstandard", &[b"\x28\xb5\x2f\xfd"], "ZST", PACKED),
+    ("xz", &[b"\xfd7zXZ"], "XZ", PACKED),
+    ("bzip2 or 7z", &[b"BZh", b"7z\xbc\xaf"], "BZ2 7Z", PACKED),
 ];
 
 /// Refuses formats that are known not to be read.
@@ -308,25 +311,33 @@ const FORMATS: [(&str, &[u8], &str, &str); 26] = [
 /// The name of the format, and what to give instead.
 pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let extension = Path::new(file).extension().unwrap_or_default();
-    let is_named = |name: &str| extension.eq_ignore_ascii_case(name);
+    let extension = extension.to_string_lossy().to_ascii_uppercase();
     let holds = |word: &[u8]| bytes.windows(word.len()).any(|window| window == word);
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let is_json = matches!(text.trim_ascii_start().first(), Some(b'{' | b'['));
-    let begins = |start: &[u8]| !start.is_empty() && text.starts_with(start);
-    let by_start = FORMATS.iter().find(|row| begins(row.1));
+    let begins = |row: &&(_, &[&[u8]], _, _)| row.1.iter().any(|start| text.starts_with(start));
+    let by_start = FORMATS.iter().find(begins);
     // A download may have been unpacked under its name.
-    let mut named = FORMATS.iter().filter(|row| is_named(row.2));
-    let by_name = named.find(|row| row.3 != PACKED || begins(row.1));
+    let is_named = |row: &&(_, _, &str, _)| row.2.split(' ').any(|name| name == extension);
+    let mut named = FORMATS.iter().filter(is_named);
+    let by_name = named.find(|row| row.3 != PACKED || begins(row));
     let stl = || bytes.starts_with(b"solid ") && holds(b"facet") || is_binary_stl(bytes);
+    let first = text.trim_ascii_start().first();
+    let is_xml = first == Some(&b'<');
+    // A first value that is sound as far as it goes.
+    let mut values = serde_json::Deserializer::from_slice(text).into_iter::<IgnoredAny>();
+    let is_json = matches!(first, Some(b'{' | b'[')) && extension != "GLTF";
+    let is_json = is_json && values.any(|value| value.err().is_none_or(|error| error.is_eof()));
     let (name, expected) = match by_name.or(by_start) {
         Some(row) => (row.0, row.3),
         None if stl() => ("STL", MESH),
-        None if is_json && !is_named("gltf") && holds(b"\"geometricError\"") => ("3D Tiles", TILES),
-        None if is_json && !is_named("gltf") && !holds(b"\"asset\"") => {
-            ("JSON without the 'asset' of glTF", PICTURE)
-        }
+        None if bytes.get(257..262) == Some(b"ustar") => ("tar", PACKED),
+        None if is_xml && holds(b"<COLLADA") => ("Collada", MESH),
+        None if is_xml => ("XML or HTML", READ),
+        None if is_json && holds(b"\"geometricError\"") => ("3D Tiles", TILES),
+        None if is_json && !holds(b"\"asset\"") => ("JSON without the 'asset' of glTF", READ),
         None => return Ok(()),
     };
+    let name = [name, &extension][usize::from(name.is_empty())];
     let found = format!("{name}, which is not read");
     Err(InputError::byte(file, 0, found, expected))
 }
@@ -398,7 +409,8 @@ mod tests {
         let mut binary_stl = vec![0; 84 + 50];
         binary_stl[80] = 1;
         let tiles = br#" {"asset":{"version":"1.1"},"geometricError":500,"root":{}}"#;
-        let cases: [(&[u8], &str, &str); 11] = [
+        let tar = [[b'n'; 257].as_slice(), b"ustar"].concat();
+        let cases: [(&[u8], &str, &str); 18] = [
             (b"solid cube\nfacet normal 0 0 1\n", "a", "STL"),
             (&binary_stl, "a", "STL"),
             (b"ply\nformat ascii 1.0\n", "a.csv", "PLY"),
@@ -410,6 +422,17 @@ mod tests {
             (b"BLENDER-v300", "a", "Blender"),
             (b"PACK\x0c\0\0\0", "a", "Quake PACK"),
             (b"EAAS\x05\0\0\0", "a", "AAS (bot paths)"),
+            (
+                b"{\n\"classname\" \"worldspawn\"",
+                "q.map",
+                "Quake editor map",
+            ),
+            (b"[gd_scene format=3]", "a.tscn", "TSCN"),
+            (b"<?xml version=\"1.0\"?>\n<osm>", "a.osm", "XML or HTML"),
+            (b"<?xml version=\"1.0\"?>\n<COLLADA>", "a", "Collada"),
+            (b"MM\x99\0\0\0", "a.3ds", "3DS"),
+            (b"\xfd7zXZ\0", "a.csv.xz", "xz"),
+            (&tar, "a", "tar"),
         ];
         for (bytes, file, name) in cases {
             let error = refuse(bytes, file).unwrap_err().to_string();
@@ -425,5 +448,12 @@ mod tests {
         for (bytes, file) in read {
             refuse(bytes, file).unwrap();
         }
+        let of = |bytes: &[u8]| {
+            read_bytes(bytes, ["a", "a"], None, &LoadOptions::default()).unwrap_err()
+        };
+        let binary = "a, byte 0: a binary file of no known format; expected boxes CSV, ";
+        assert!(of(b"\x7fELF\x02\0\0\0").to_string().starts_with(binary));
+        assert!(of(b"\xff\xfem\0").to_string().contains("UTF-16"));
+        assert!(of(b"{\"classname\" 1}").to_string().contains("expected"));
     }
 }
