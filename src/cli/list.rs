@@ -134,7 +134,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
             let note = format!(
                 "In a mesh, n is the number of triangles.\nA scene is also a file: boxes CSV, \
                  glTF or GLB, OBJ, a Doom WAD (maps.wad#MAP07 picks a map), a Quake III BSP, or a \
-                 zip or pk3 with one (pak.pk3#maps/q.bsp).\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{}",
+                 zip or pk3 with one (pak.pk3#maps/q.bsp).\nFetched scenes are looked for from the working directory.\nReal scenes have licences of their own: `{} licences`.\nSuites of `run`:\n{}",
                 program::name(),
                 text::entries(suites, text::width())
             );

@@ -280,7 +280,7 @@ impl<'a> Run<'a> {
         let basis = text::conclusion(report);
         let time = [" in", ", resumed for"][usize::from(self.resumes)];
         let basis = format!("{cells}{time} {seconds:.1} s, {failed} {how}; {basis}");
-        let warnings = report.noise.warnings.iter();
+        let warnings = report.noise.warnings.iter().chain(&report.run.left_out);
         let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
         let kept = save.map(|name| {
             let file = compare::baseline_file(name);

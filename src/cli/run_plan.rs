@@ -15,7 +15,7 @@ use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
 use crate::motion::Motion;
 use crate::path::{self, DEFAULT_PATH, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, FETCHED, LoadOptions, every_part, split_part};
+use crate::scene::{self, FETCHED, FETCHED_FOLDER, Fetched, every_part, split_part};
 use crate::suite::{REAL, REAL_PATHS, SUITES, Suite};
 
 /// A plan with where it comes from.
@@ -27,6 +27,8 @@ pub struct RunPlan {
     pub structures: String,
     /// True if nothing in it is the user's own.
     is_built_in: bool,
+    /// Scenes of the suite that cannot be measured here, and why.
+    pub left_out: Option<String>,
     /// Groups of the whole plan, if this is a shard.
     pub whole: Vec<GroupKey>,
 }
@@ -66,8 +68,9 @@ pub fn plan_of(
     each_once("test", tests())?;
     let list = args.moves.list(&names);
     let structures = args.culling.kernel.structures(registry, list)?;
+    let (scenes, left_out) = scenes(args, &suite)?;
     let mut plan = Plan {
-        scenes: scenes(args, &suite)?,
+        scenes,
         cullings,
         lens: args.culling.lens.defaults()?,
         motions: Vec::new(),
@@ -94,6 +97,7 @@ pub fn plan_of(
         is_built_in: is_suite && suite.is_built_in() && suite.name != REAL,
         suite: is_suite.then_some(suite.name),
         structures: names,
+        left_out,
         whole: Vec::new(),
     })
 }
@@ -209,8 +213,9 @@ pub fn same_digest(
     Ok(())
 }
 
-fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputError> {
-    let mut scenes = suite.scenes.clone();
+/// Scenes of the plan, and a line on those of the suite that it lacks.
+fn scenes(args: &WhatArgs, suite: &Suite) -> Result<(Vec<PlannedScene>, Option<String>)> {
+    let (mut scenes, mut left_out) = (suite.scenes.clone(), None);
     if !args.scene.is_empty() {
         scenes.clear();
         for source in &args.scene {
@@ -218,24 +223,17 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
             scenes.extend(parts.map(|source| PlannedScene::new(&source, &[DEFAULT_PATH])));
         }
     } else if suite.name == REAL {
-        let mut missing = Vec::new();
-        for row in &*FETCHED {
-            let own = row.scenes();
-            let read = |source: &String| scene::load(source, &LoadOptions::default()).map(drop);
-            let unknown = if row.is_converted() { &own[..] } else { &[] };
-            match unknown.iter().try_for_each(read) {
-                _ if !row.is_there() => missing.push(row.name.as_str()),
-                _ if own.is_empty() => note(&format!("not part of the suite: {}", row.name)),
-                Err(error) => note(&format!("left out: {error}")),
-                Ok(()) => scenes.extend(own.iter().map(|s| PlannedScene::new(s, REAL_PATHS))),
-            }
-        }
+        let own = FETCHED.iter().filter(|row| !row.scenes().is_empty());
+        let (there, missing): (Vec<_>, Vec<_>) = own.partition(|row| row.is_there());
+        let there = there.into_iter().flat_map(Fetched::scenes);
+        scenes.extend(there.map(|source| PlannedScene::new(&source, REAL_PATHS)));
         if !missing.is_empty() {
-            let names = missing.join(" ");
-            let how = format!("to fetch them: scripts/fetch.py {names}");
-            note(&format!(
-                "left out, as not fetched or damaged: {names}; {how}"
-            ));
+            let names: String = missing.iter().map(|row| format!(" {}", row.name)).collect();
+            let place = format!("{FETCHED_FOLDER} of the working directory");
+            let how = "(scripts/fetch.py fetches them)";
+            let line = format!("left out, as missing or damaged in {place} {how}:{names}");
+            note(&line);
+            left_out = Some(line);
         }
     }
     for scene in &mut scenes {
@@ -244,5 +242,5 @@ fn scenes(args: &WhatArgs, suite: &Suite) -> Result<Vec<PlannedScene>, InputErro
             scene.paths.clone_from(&args.path);
         }
     }
-    Ok(scenes)
+    Ok((scenes, left_out))
 }

@@ -40,6 +40,7 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     header.source = program::source();
     header.run.command = command_line(&typed);
     header.run.suite = plan.suite.clone();
+    header.run.left_out.clone_from(&plan.left_out);
     header.run.shard.clone_from(&args.shard);
     header.args = typed;
     header.whole.clone_from(&plan.whole);

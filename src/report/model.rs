@@ -80,6 +80,9 @@ pub struct RunInfo {
     /// Scenes and paths of the plan that nothing was measured of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
+    /// Scenes of the suite that are not in the plan, and why; null for a whole suite.
+    #[serde(default)]
+    pub left_out: Option<String>,
 }
 
 fn one() -> u32 {

@@ -60,7 +60,7 @@ pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_
 pub use rng::SeededRng;
 pub(crate) use rng::{mix64, on_sphere};
 pub use rooms::{Portal, Tiling};
-pub use samples::{FETCHED, Fetched, NOTICE, SAMPLES, Sample};
+pub use samples::{FETCHED, FETCHED_FOLDER, Fetched, NOTICE, SAMPLES, Sample};
 pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
 pub use surface::{ItemShape, SurfaceKind, Surfaces, volume_within};
 pub use wad::{WadMap, map_names};

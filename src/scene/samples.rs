@@ -58,7 +58,7 @@ impl Sample {
 }
 
 /// Folder of the fetched files, from the working directory.
-const FOLDER: &str = "datasets/fetched";
+pub const FETCHED_FOLDER: &str = "datasets/fetched";
 
 /// A file with real scenes that is fetched and not part of the program.
 #[derive(Deserialize)]
@@ -67,10 +67,8 @@ pub struct Fetched {
     pub name: String,
     /// File in the folder of fetched files.
     file: String,
-    /// File in its package; other kinds of files are converted.
-    member: String,
     /// Digest of that file.
-    sha256: String,
+    file_sha256: String,
     /// SPDX identifier, and whom to name.
     pub licence: String,
     /// Scenes in the file for the suite `real`; perhaps none.
@@ -91,30 +89,19 @@ pub static FETCHED: LazyLock<Vec<Fetched>> = LazyLock::new(|| {
 impl Fetched {
     /// File from the working directory.
     pub fn path(&self) -> PathBuf {
-        Path::new(FOLDER).join(&self.file)
+        Path::new(FETCHED_FOLDER).join(&self.file)
     }
 
-    /// Tests whether the file has been fetched, and is the published one.
+    /// Tests whether the file has been fetched, and is the published one or made of it.
     pub fn is_there(&self) -> bool {
-        let is_it = |bytes: Vec<u8>| hex(&hmac_sha256::Hash::hash(&bytes)) == self.sha256;
-        match self.is_converted() {
-            true => self.path().is_file(),
-            false => fs::read(self.path()).is_ok_and(is_it),
-        }
-    }
-
-    /// Tests whether the file is made of the published one.
-    ///
-    /// Its own digest is not known then.
-    pub fn is_converted(&self) -> bool {
-        let kind = |file: &str| Path::new(file).extension().map(ToOwned::to_owned);
-        kind(&self.member) != kind(&self.file)
+        let is_it = |bytes: Vec<u8>| hex(&hmac_sha256::Hash::hash(&bytes)) == self.file_sha256;
+        fs::read(self.path()).is_ok_and(is_it)
     }
 
     /// Scenes for the suite `real`, as typed.
     pub fn scenes(&self) -> Vec<String> {
         let maps = self.scenes.split_whitespace();
-        maps.map(|map| format!("{FOLDER}/{}{}", self.file, map.trim_matches('.')))
+        maps.map(|map| format!("{FETCHED_FOLDER}/{}{}", self.file, map.trim_matches('.')))
             .collect()
     }
 }

@@ -233,7 +233,7 @@ fn every_command_has_help() {
 }
 
 #[test]
-fn damaged_files_and_those_without_a_scene_of_the_suite_are_named() {
+fn fetched_files_that_are_missing_or_damaged_are_told_and_recorded() {
     let folder = folder(&[]);
     let fetched = folder.path().join("datasets/fetched");
     fs::create_dir_all(&fetched).expect("a folder");
@@ -251,15 +251,28 @@ fn damaged_files_and_those_without_a_scene_of_the_suite_are_named() {
         row("engine.glb")["state"],
         "missing, scripts/fetch.py engine"
     );
-    assert_eq!(row("cities.csv")["state"], "fetched");
+    let damaged = "missing, scripts/fetch.py cities";
+    assert_eq!(row("cities.csv")["state"], damaged);
     assert_eq!(row("engine.glb")["licence"], "BSD-3-Clause");
     let done = cullbench(folder.path(), "run --suite real --path none.csv");
     assert_eq!(done.code, Some(2));
     for told in [
-        "note: left out: datasets/fetched/cities.csv, line 1: ",
-        "note: left out, as not fetched or damaged: freedm freedoom2 engine stars ",
+        "note: left out, as missing or damaged in datasets/fetched of the working directory (",
+        "scripts/fetch.py fetches them): freedm freedoom2 engine cities stars sponza kitchen openarena\n",
         "none.csv: No such file",
     ] {
         assert!(done.err.contains(told), "{told}: {}", done.err);
     }
+    let short = "--path orbit:frames=2 --structure linear --processes 1 --no-bounds --out r";
+    let Done { code, out, .. } = cullbench(folder.path(), &format!("run --suite real {short}"));
+    assert_eq!(code, Some(0));
+    let read = |file| fs::read_to_string(folder.path().join("r").join(file)).expect("a file");
+    let left_out = &json(&read("report.json"))["run"]["left_out"];
+    let left_out = left_out.as_str().expect("a line");
+    assert!(left_out.contains(": freedm freedoom2 engine cities "));
+    assert!(
+        out.contains("warning: left out, as missing or damaged"),
+        "{out}"
+    );
+    assert!(read("report.html").contains(left_out));
 }
