@@ -230,7 +230,7 @@ fn what_must_not_be_mixed_is_refused_by_name() {
     // Only the first process has the answers and the plan.
     let second = text.replace(&format!("{}\n", lines[1]), "");
     fs::write(part2.join("stream.jsonl"), second).expect("writable");
-    refused("stream.jsonl, line 2: process 2 of city | expected the part of its process 1 before");
+    refused("stream.jsonl, line 3: process 2 of city | expected the part of its process 1 before");
     let bad = text.replacen("\"process\":0", "\"process\":-7", 1);
     fs::write(part2.join("stream.jsonl"), bad).expect("writable");
     refused("stream.jsonl, line 2, column | part.process: '-7'; expected | a whole number from 0");
