@@ -3,10 +3,12 @@
 
 usage: check-page.py PAGE.html.. [--shots DIR] [--most-mb N]
 
-For each page but those of `view`, at 390, 1,400 and 1,800 px, light and dark: no error on the console, nothing loaded
-from elsewhere, nothing wider than the window, every figure has marks, texts of a figure stay on
-the page; first paint within a second, and no more than 2 MB. Filter, sorting and the state in the
-hash of the address work. A page of `view` decodes its views, and its keys work. --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
+For each page but those of `view`, at 390, 1,400 and 1,800 px, light and dark: no error on the
+console, nothing loaded from elsewhere, nothing wider than the window, every figure has marks, texts
+of a figure stay on the page; first paint within a second, and no more than 2 MB. Filter, sorting
+and the state in the hash of the address work. A page of `view` decodes its views, its keys work,
+and 20,000 boxes are drawn at 30 frames per second by software rendering on one core (by processor
+time). --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
 Standard library only.
 """
 
@@ -23,6 +25,8 @@ import time
 WIDTHS = [390, 1400, 1800]
 SCHEMES = ["light", "dark"]
 LONGEST_PAINT_MS = 1000
+# Of a page of `view` with so many items, 30 frames per second of one core.
+LONGEST_FRAME_MS, MOST_ITEMS = 1000 / 30, 20_000
 
 # Faults of a page as it is shown, as a list of sentences. A narrow window reports the width of
 # what does not fit into it: innerWidth stands for the width asked for.
@@ -122,6 +126,19 @@ KEYS = """(async () => {
   return faults;
 })()"""
 
+# Draws frames one by one, from afar where the scene is turned in each, or through the cameras.
+FRAMES = """(async (count) => {
+  const stage = document.getElementById("stage"), slider = document.getElementById("frame");
+  const isThrough = document.getElementById("through").ariaPressed === "true";
+  for (let n = 0; n < count; n++) {
+    const wheel = new WheelEvent("wheel", { deltaY: n % 40 < 20 ? 20 : -20, cancelable: true });
+    if (isThrough || n % 2) slider.value = (Number(slider.value) + 1) % (Number(slider.max) + 1);
+    slider.dispatchEvent(new Event("input"));
+    if (!isThrough) stage.dispatchEvent(wheel);
+    await new Promise(requestAnimationFrame);
+  }
+})"""
+
 # Paper has no use for what is clicked.
 PRINT = """[...document.querySelectorAll("#filter,.t+.copy")].some((item) => getComputedStyle(item).display !== "none")
   ? ["buttons are printed"] : []"""
@@ -139,13 +156,14 @@ STATE = """(() => {
 class Browser:
     """Chromium by its DevTools protocol over two pipes."""
 
-    def __init__(self, profile):
+    def __init__(self, profile, cores=None):
         (down, self.send), (self.receive, up) = os.pipe(), os.pipe()
         program = os.environ.get("CHROMIUM", "chromium")
         options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
                    "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]
         line = ["sh", "-c", f'exec "$@" 3<&{down} 4>&{up}', "sh", program, *options]
-        self.process = subprocess.Popen(line, pass_fds=[down, up], stderr=subprocess.DEVNULL)
+        pin = (lambda: os.sched_setaffinity(0, cores)) if cores else None
+        self.process = subprocess.Popen(line, pass_fds=[down, up], stderr=subprocess.DEVNULL, preexec_fn=pin)
         os.close(down)
         os.close(up)
         self.rest, self.count, self.events, self.session = b"", 0, [], None
@@ -199,6 +217,28 @@ class Browser:
             return [json.dumps(found["exceptionDetails"])]
         return found["result"].get("value")
 
+    def seconds(self):
+        """Processor time of all processes, by their ids."""
+        self.session, session = None, self.session
+        found = self.call("SystemInfo.getProcessInfo")["processInfo"]
+        self.session = session
+        return {process["id"]: process["cpuTime"] for process in found}
+
+    def frame_ms(self, count=60):
+        """Processor time of a frame of `view` in motion, when its scale has settled."""
+        self.value(f"{FRAMES}(40)")
+        before = self.seconds()
+        self.value(f"{FRAMES}({count})")
+        spent = sum(time - before.get(own, 0) for own, time in self.seconds().items())
+        return 1000 * spent / count
+
+    def close(self):
+        self.session = None
+        self.call("Browser.close")
+        self.process.wait(20)
+        os.close(self.send)
+        os.close(self.receive)
+
     def complaints(self):
         self.value("0")
         kinds = {"Runtime.exceptionThrown", "Log.entryAdded"}
@@ -216,6 +256,19 @@ class Browser:
         file.write_bytes(base64.b64decode(found["data"]))
 
 
+def frame_times(url):
+    """Times per frame from afar and through the cameras, of a browser on one core."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(profile, [min(os.sched_getaffinity(0))])
+        browser.open(url)
+        browser.show(1400, "light", url)
+        afar = browser.frame_ms()
+        browser.value("document.getElementById('through').click()")
+        through = browser.frame_ms()
+        browser.close()
+    return afar, through
+
+
 def check(browser, page, shots, most_mb):
     faults = []
     size = page.stat().st_size / 1e6
@@ -226,7 +279,11 @@ def check(browser, page, shots, most_mb):
     browser.show(1400, "light", url)
     if browser.value("!!document.getElementById('now')"):
         faults += browser.value(KEYS) + list(browser.complaints())
-        return said(page, size, faults, "a view")
+        items, (afar, through) = browser.value("scene.data.items"), frame_times(url)
+        if max(afar, through) > LONGEST_FRAME_MS and items <= MOST_ITEMS:
+            faults.append(f"expected at most {LONGEST_FRAME_MS:.0f} ms per frame")
+        what = f"{items} boxes, {afar:.0f} ms per frame from afar, {through:.0f} ms through the camera"
+        return said(page, size, faults, what)
     paints = []
     for width in WIDTHS:
         for scheme in SCHEMES:
@@ -279,9 +336,7 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(profile)
         sound = [check(browser, page, args.shots, args.most_mb) for page in args.pages]
-        browser.session = None
-        browser.call("Browser.close")
-        browser.process.wait(20)
+        browser.close()
     sys.exit(0 if all(sound) else 1)
 
 

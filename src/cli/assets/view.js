@@ -113,8 +113,7 @@
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
     const { clip, eye, window } = view();
     const off = [...look.off].reduce((mask, fate) => mask | (1 << fate), 0);
-    // In motion, boxes of less than three pixels from the middle on.
-    const small = window || scale === REST ? 0 : (6 * look.distance) / (ZOOM * size[1]);
+    const small = scale === REST ? 0 : 3;
     const strokes = [];
     const stroke = (corners, matrix, alpha, width, isBehind) => {
       strokes.push([corners, matrix, [...paint.ink, alpha], width * ratio, isBehind]);
@@ -133,7 +132,7 @@
 
   // ---- one picture per change; in motion with as many pixels as 30 pictures a second allow,
   // at rest with four samples per pixel
-  let [waiting, playing, shown, stepped, before, rest] = [false, false, -1, 0, 0, 0];
+  let [waiting, playing, isStale, isDrawn, shown, stepped, before, rest] = [false, false, true, false, -1, 0, 0, 0];
   let [scale, ceiling, intervals] = [1, REST, []];
   const adapt = (interval) => {
     if (interval < 250) intervals.push(interval);
@@ -144,20 +143,26 @@
     else if (middle < 20 && scale * 1.4 < ceiling) scale *= 1.4;
   };
   const redraw = () => {
+    isStale = true;
+    next();
+  };
+  const next = () => {
     if (waiting) return;
     waiting = true;
     requestAnimationFrame((now) => {
       waiting = false;
-      adapt(now - before);
+      if (isDrawn) adapt(now - before);
       before = now;
       if (playing && now - stepped > 1000 / 15) {
         stepped = now;
         look.frame = (look.frame + 1) % frames.length;
       }
+      isDrawn = isStale || shown !== look.frame;
+      isStale = false;
       if (shown !== look.frame) tell();
-      if (gpu) draw(scale);
+      if (gpu && isDrawn) draw(scale);
       clearTimeout(rest);
-      if (playing) redraw();
+      if (playing) next();
       else rest = setTimeout(() => gpu && draw(REST), 150);
     });
   };

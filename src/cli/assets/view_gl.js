@@ -1,11 +1,15 @@
 "use strict";
 // Boxes and lines by WebGL2.
 const painter = (() => {
-  const BOX = `#version 300 es
-precision highp float; precision highp int; precision highp usampler2D;
+  const BOX = `precision highp float; precision highp int; precision highp usampler2D;
 uniform highp sampler2D corners; uniform usampler2D fates;
 uniform mat4 clip; uniform vec4 eye; uniform vec3 colours[5]; uniform int off, up;
-flat out vec3 colour; out vec3 at; flat out int axis;
+flat out vec3 colour;
+#ifdef EDGES
+out vec3 at; flat out int axis;
+#else
+vec3 at; int axis;
+#endif
 // Three sides face the eye: all but one corner, 0. Corners 1, 2 and 4 belong to one side each.
 void main() {
   int item = gl_VertexID >> 3, corner = gl_VertexID & 7;
@@ -33,6 +37,11 @@ void main() {
   float dark = .4 * clamp(1.2 - 4. * max(wide.x, max(wide.y, wide.z)), 0., 1.);
   result = vec4(colour * (1. - dark + dark * clamp(min(edge.x, min(edge.y, edge.z)), 0., 1.)), 1);
 }`;
+  // Boxes of a few pixels have one colour.
+  const PLAIN_COLOUR = `#version 300 es
+precision highp float;
+flat in vec3 colour; out vec4 result;
+void main() { result = vec4(colour, 1); }`;
   const LINE = `#version 300 es
 layout(location=0) in vec3 low; layout(location=1) in vec3 high;
 uniform mat4 clip; uniform vec2 size; uniform float width;
@@ -55,7 +64,6 @@ void main() {
 precision highp float;
 uniform vec4 colour; out vec4 result;
 void main() { result = colour; }`;
-
 
   const program = (gl, vertex, fragment) => {
     const made = gl.createProgram();
@@ -81,27 +89,64 @@ void main() { result = colour; }`;
       gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, rows, 0, format, type, numbers);
     };
   };
-  // The last corner of a triangle decides its colour: three sides, or two triangles within
-  // the outline for boxes of a few pixels.
+  // The last corner of a triangle decides its colour: three sides, or four corners of the
+  // outline for boxes of a few pixels.
   const SIDES = [3, 7, 1, 7, 5, 1, 3, 7, 2, 7, 6, 2, 5, 7, 4, 7, 6, 4];
-  const STAR = [3, 6, 5, 1, 2, 4];
+  const QUAD = [1, 2, 5, 2, 6, 5];
+
+  // Chunks of the boxes, larger boxes first: the quarters by size, each along the curve. A chunk
+  // has its boxes in `order`, its own box and its longest edge.
+  const CHUNKS = 256, QUARTERS = 4;
+  const chunked = (boxes, count) => {
+    const edges = Float32Array.from({ length: count }, (_, n) => Math.max(...[0, 1, 2].map((k) => boxes[6 * n + 3 + k] - boxes[6 * n + k])));
+    const order = Uint32Array.from(edges.keys()).sort((a, b) => edges[b] - edges[a]);
+    const quarter = Math.ceil(count / QUARTERS), most = Math.ceil(count / CHUNKS);
+    for (let n = 0; n < count; n += quarter) order.subarray(n, n + quarter).sort();
+    const chunks = [];
+    for (let from = 0; from < count; from += most) {
+      const own = order.subarray(from, from + most);
+      const side = (k, best) => own.reduce((found, n) => best(found, boxes[6 * n + k]), boxes[6 * own[0] + k]);
+      const [low, high] = [[0, 1, 2].map((k) => side(k, Math.min)), [3, 4, 5].map((k) => side(k, Math.max))];
+      const [centre, half] = [1, -1].map((sign) => high.map((x, k) => (x + sign * low[k]) / 2));
+      chunks.push({ from, to: from + own.length, centre, half, edge: own.reduce((most, n) => Math.max(most, edges[n]), 0) });
+    }
+    return { order, chunks };
+  };
+  // Runs of boxes in sight, [from, to, is small], where the longest edge of small ones has at
+  // most `pixels` of `height`.
+  const inSight = (chunks, clip, height, pixels) => {
+    const runs = [];
+    const grows = (Math.hypot(clip[1], clip[5], clip[9]) * height) / 2;
+    const row = (k) => [0, 1, 2, 3].map((c) => clip[4 * c + k]);
+    const w = row(3);
+    const outward = [0, 1, 2].flatMap((k) => [1, -1].map((sign) => row(k).map((x, c) => sign * x - w[c])));
+    // Least value of a plane in a box.
+    const least = (p, c, h) => p[3] + p[0] * c[0] + p[1] * c[1] + p[2] * c[2] - Math.abs(p[0]) * h[0] - Math.abs(p[1]) * h[1] - Math.abs(p[2]) * h[2];
+    for (const { from, to, centre, half, edge } of chunks) {
+      if (outward.some((plane) => least(plane, centre, half) > 0)) continue;
+      const isSmall = edge * grows < pixels * least(w, centre, half);
+      const last = runs.at(-1);
+      if (last && last[1] === from && last[2] === isSmall) last[1] = to;
+      else runs.push([from, to, isSmall]);
+    }
+    return runs;
+  };
 
   // Draws `count` boxes of two corners each. Throws if a shader does not compile. No
   // instances: software renderers draw each by itself.
   return (gl, boxes, count) => {
-    const [box, line] = [program(gl, BOX, BOX_COLOUR), program(gl, LINE, LINE_COLOUR)];
+    const head = "#version 300 es\n";
+    const box = program(gl, `${head}#define EDGES\n${BOX}`, BOX_COLOUR);
+    const [plain, line] = [program(gl, head + BOX, PLAIN_COLOUR), program(gl, LINE, LINE_COLOUR)];
     const rows = Math.ceil(count / 1024);
     texture(gl, 0, 2048, gl.RGB32F, gl.RGB, gl.FLOAT)(boxes, rows);
     const states = texture(gl, 1, 1024, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE);
     const [items, lines] = [gl.createVertexArray(), gl.createVertexArray()];
     gl.bindVertexArray(items);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    // The largest boxes come first.
-    const edges = Float32Array.from({ length: count }, (_, n) => -Math.max(...[0, 1, 2].map((k) => boxes[6 * n + 3 + k] - boxes[6 * n + k])));
-    const order = Uint32Array.from(edges.keys()).sort((a, b) => edges[a] - edges[b]);
-    edges.sort();
+    const { order, chunks } = chunked(boxes, count);
     const corners = new Uint32Array(24 * count);
-    for (const [from, shape] of [[0, SIDES], [18 * count, STAR]]) {
+    for (const [from, shape] of [[0, SIDES], [18 * count, QUAD]]) {
       order.forEach((item, n) => shape.forEach((corner, k) => (corners[from + shape.length * n + k] = 8 * item + corner)));
     }
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
@@ -114,7 +159,7 @@ void main() { result = colour; }`;
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
 
     const update = (fates) => states(fates, rows);
-    // Boxes below `small` are drawn with fewer triangles.
+    // Boxes of at most `small` pixels are drawn with fewer triangles.
     // `strokes`: [corners, matrix, colour with alpha, half the width in pixels, behind boxes?]
     const draw = ({ size, ground, colours, off, clip, eye, small, strokes, up }) => {
       gl.viewport(0, 0, ...size);
@@ -122,25 +167,29 @@ void main() { result = colour; }`;
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       gl.enable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
-      gl.useProgram(box.made);
-      gl.uniformMatrix4fv(box.at.clip, false, clip);
-      gl.uniform4fv(box.at.eye, eye);
-      gl.uniform3fv(box.at.colours, colours.flat());
-      gl.uniform1i(box.at.off, off);
-      gl.uniform1i(box.at.up, up);
-      gl.uniform1i(box.at.fates, 1);
       gl.bindVertexArray(items);
-      const large = small > 0 ? edges.findIndex((edge) => -edge < small) : -1;
-      const full = large < 0 ? count : large;
-      gl.drawElements(gl.TRIANGLES, 18 * full, gl.UNSIGNED_INT, 0);
-      gl.drawElements(gl.TRIANGLES, 6 * (count - full), gl.UNSIGNED_INT, 4 * (18 * count + 6 * full));
+      const runs = inSight(chunks, clip, size[1], small);
+      // Corners of a box, where their indices begin.
+      for (const [{ made, at }, areSmall, each, first] of [[box, false, 18, 0], [plain, true, 6, 18 * count]]) {
+        gl.useProgram(made);
+        gl.uniformMatrix4fv(at.clip, false, clip);
+        gl.uniform4fv(at.eye, eye);
+        gl.uniform3fv(at.colours, colours.flat());
+        gl.uniform1i(at.off, off);
+        gl.uniform1i(at.up, up);
+        gl.uniform1i(at.fates, 1);
+        for (const [from, to, isSmall] of runs) {
+          if (isSmall === areSmall) gl.drawElements(gl.TRIANGLES, each * (to - from), gl.UNSIGNED_INT, 4 * (first + each * from));
+        }
+      }
       gl.useProgram(line.made);
       gl.uniform2fv(line.at.size, size);
       gl.enable(gl.BLEND);
       gl.bindVertexArray(lines);
       for (const [corners, matrix, colour, width, isBehind] of strokes) {
         (isBehind ? gl.enable : gl.disable).call(gl, gl.DEPTH_TEST);
-        const ends = Float32Array.from({ length: 6 * corners.length }, (_, n) => corners[6 * Math.floor(n / 36) + (n % 6)]);
+        const ends = new Float32Array(6 * corners.length);
+        for (let n = 0; n < ends.length; n++) ends[n] = corners[6 * Math.floor(n / 36) + (n % 6)];
         gl.bufferData(gl.ARRAY_BUFFER, ends, gl.STREAM_DRAW);
         gl.uniformMatrix4fv(line.at.clip, false, matrix);
         gl.uniform1f(line.at.width, width);
