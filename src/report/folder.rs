@@ -308,7 +308,10 @@ const COLUMNS: [&str; 2] = [
      ortho_height_max=path/lens/ortho_height/1 aspect_min=path/lens/aspect/0 \
      aspect_max=path/lens/aspect/1 near_min=path/lens/near/0 near_max=path/lens/near/1 \
      far_min=path/lens/far/0 far_max=path/lens/far/1 \
-     matrix_convention=path/lens/matrix/convention motion=path/motion \
+     matrix_convention=path/lens/matrix/convention matrix_depth_near=path/lens/matrix/depth/0 \
+     matrix_depth_far=path/lens/matrix/depth/1 matrix_eye_x=path/lens/matrix/eye/0 \
+     matrix_eye_y=path/lens/matrix/eye/1 matrix_eye_z=path/lens/matrix/eye/2 \
+     matrix_is_mirrored=path/lens/matrix/is_mirrored motion=path/motion \
      views_per_frame=path/views_per_frame chose skipped_items=scene/skipped_items",
 ];
 

@@ -238,6 +238,19 @@ fn matrices_are_said_taken_apart() {
             assert!(words.contains(wanted), "{wanted}: {words}");
         }
     }
+    let summary = std::fs::read_to_string(folder.path().join("run/summary.csv")).expect("a table");
+    let row = &rows(&summary)[0];
+    for (column, wanted) in [
+        ("matrix_convention", "column-gl"),
+        ("matrix_depth_near", "-1"),
+        ("matrix_depth_far", "1"),
+        ("matrix_eye_x", "2"),
+        ("matrix_eye_y", "3"),
+        ("matrix_eye_z", "1"),
+        ("matrix_is_mirrored", "false"),
+    ] {
+        assert_eq!(row[column], wanted, "{column}");
+    }
     let info = json(&works(
         folder.path(),
         &format!("scene info z.csv {cameras} --format json"),
