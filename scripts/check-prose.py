@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST_SUMMARY = 80
-RUST = ["src", "tests", "benches", "examples", "fuzz/src"]
+RUST = ["src", "tests", "benches", "examples", "scripts", "fuzz/src"]
 FOLDERS = [*((folder, "*.rs") for folder in RUST), ("docs", "*.md"), ("src/cli/assets", "*.txt")]
 
 # Rule -> what to write. A space in a phrase is any white space, a line break of a comment or of

@@ -256,7 +256,7 @@ fn no_files_import_each_other_in_a_circle() {
 #[test]
 fn every_file_says_what_it_owns() {
     let mut files = Vec::new();
-    for folder in ["src", "tests", "benches", "examples"] {
+    for folder in ["src", "tests", "benches", "examples", "scripts"] {
         rust_files(Path::new(folder), &mut files);
     }
     assert!(files.len() > 40, "{} files", files.len());

@@ -75,7 +75,8 @@ pub use linear::{Linear, LinearParams, LinearScalar};
 pub(crate) use registry::{DEFAULT, MOTION};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
+pub use tree::Tree;
 #[cfg(feature = "cli")]
 pub(crate) use tree::node::{NEAR, Stack};
-pub use tree::{Built, PackedTree, Part, Splitter, Tree, TreeBuilder, TreeNode, build_top_down};
+pub(crate) use tree::{Built, PackedTree, Part, Splitter, TreeBuilder, build_top_down};
 pub use wide::{Auto, AutoParams, BlockOrder, Moving, Wide, WideParams};

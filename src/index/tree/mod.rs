@@ -10,12 +10,15 @@
 //! | `search` | queries by volumes and by points |
 //! | `partition` | top-down construction by a [`Splitter`] |
 //! | `splits` | region search by dividing planes, for `bsp` |
+//! | `tests_recorder` | region search by hand, beside which `scripts/check-recorder.sh` counts |
 
 pub mod node;
 mod packed;
 mod partition;
 mod search;
 mod splits;
+#[cfg(test)]
+mod tests_recorder;
 mod wide_nodes;
 
 use std::marker::PhantomData;
