@@ -5,6 +5,9 @@
 //! of a concave face. Boxes hold the vertices as written. Weights and colours of vertices, normals and texture
 //! coordinates change nothing. Source: Wavefront Technologies, Advanced Visualizer Manual,
 //! appendix B1, "Object Files (.obj)".
+//!
+//! A reader of our own: the crate tobj (4.0.5) panics in debug builds on `f 1/-5 2/-5 3/-5`, makes
+//! triangles of `l 1 2 3 4`, and checks indices where the line is lost.
 
 use std::collections::BTreeSet;
 use std::fmt::Display;

@@ -1,4 +1,6 @@
 //! A glTF file with its buffers: what its indices and accessors refer to.
+//!
+//! Chunks of a GLB are read here: the reader of the crate gltf panics on a short one.
 
 use std::borrow::Cow;
 use std::collections::HashMap;

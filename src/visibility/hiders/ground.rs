@@ -9,6 +9,9 @@
 //! A box whose top is nowhere above that height hides what is behind it from whatever
 //! begins above it: a ray that enters the box has come down through the height before,
 //! over the rectangle all the way, so it has met a triangle from above.
+//!
+//! Not drawn from above all of the ground, where they displace trees in the two layers of the
+//! masked buffer (mesh:forest: 110 of 1,684 items removed in place of 190).
 
 use std::collections::HashMap;
 use std::time::Instant;
