@@ -1,5 +1,6 @@
-//! Reading JSON, with errors that name place, text found and text expected, in
-//! other words than those of the reader's program.
+//! Reading JSON, with errors that name place, text found and text expected.
+//!
+//! Their words are not those of the reader's program.
 
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;

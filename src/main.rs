@@ -1,5 +1,6 @@
-//! The `cullbench` program: the command line of the library over the
-//! structures of this build.
+//! The `cullbench` program.
+//!
+//! The command line of the library over the structures of this build.
 
 use std::process::ExitCode;
 

@@ -1,5 +1,7 @@
-//! Tables in the source: enums whose values have names for people and files, rows
-//! of structs, and fields with default values. It defines how such a table is written down.
+//! Tables in the source, and how they are written down.
+//!
+//! Enums whose values have names for people and files, rows of structs, and fields with default
+//! values.
 
 /// Declares an enum with its names: `ALL` in this order, and `name`.
 /// With the name of a table behind the enum's, each name is followed by its description,

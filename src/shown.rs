@@ -1,6 +1,7 @@
-//! How what came from outside is shown: text without anything that a terminal,
-//! a picture or a page would obey, and counts with the word they count. It defines
-//! which characters are harmless, for every output there is.
+//! Text from outside as it is shown, and counts with the word they count.
+//!
+//! Leaves out everything that a terminal, a picture or a page would obey. Defines which
+//! characters are harmless, for every output there is.
 
 use std::io;
 

@@ -1,7 +1,8 @@
-//! The little language of the command line: `name:key=value,key=value` names
-//! a scene family, a camera path or a structure together with its parameters.
-//! It defines the syntax, numbers such as `100k` or `2%`, and the nearest
-//! suggestion for a misspelt word; what the words mean is up to their owners.
+//! The little language of the command line: `name:key=value,key=value`.
+//!
+//! Names a scene family, a camera path or a structure together with its parameters. Defines the
+//! syntax, numbers such as `100k` or `2%`, and the nearest suggestion for a misspelt word; what
+//! the words mean is up to their owners.
 
 use std::collections::BTreeMap;
 use std::fmt;

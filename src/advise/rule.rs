@@ -1,5 +1,6 @@
-//! A rule of omission: its declaration, both sides as tasks, and the omission that
-//! follows from the rest of the advice.
+//! A rule of omission: its declaration and both sides as tasks.
+//!
+//! Holds also the omission that follows from the rest of the advice.
 
 use serde::Serialize;
 

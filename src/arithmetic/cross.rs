@@ -1,5 +1,6 @@
-//! The cross product without cancellation: for vectors that are nearly
-//! parallel, or products of which little is left.
+//! The cross product without cancellation.
+//!
+//! For vectors that are nearly parallel, or products of which little is left.
 
 use glam::{DVec3, Vec3Swizzles};
 

@@ -1,7 +1,8 @@
-//! Exact arithmetic on doubles: a number as a sum of doubles that do not
-//! overlap (Shewchuk 1997, "Adaptive precision floating-point arithmetic and
-//! fast robust geometric predicates", Discrete & Computational Geometry 18,
-//! p. 305). Also precise arithmetic: the same sums cut to their leading terms.
+//! Exact arithmetic on doubles: numbers as sums that do not overlap.
+//!
+//! Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric
+//! predicates", Discrete & Computational Geometry 18, p. 305. Also precise arithmetic: the same
+//! sums cut to their leading terms.
 
 use std::ops::{Add, Mul, Neg, Sub};
 

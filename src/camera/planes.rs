@@ -1,6 +1,7 @@
-//! From a camera to the planes of its view volume: the selectable derivations
-//! (from the frame or from a matrix, in f32 or f64) and the conservative
-//! epsilon that makes a false negative impossible.
+//! Planes of a camera's view volume, by selectable derivations.
+//!
+//! Derivations start at the frame or at a matrix, in f32 or f64; a conservative epsilon makes a
+//! false negative impossible.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,6 @@
-//! Small errors that add up, in bases and spring arms of cameras: the methods that
-//! are compared, their references, and which method to take.
+//! Small errors that add up in bases and spring arms of cameras.
+//!
+//! The methods that are compared, their references, and which method to take.
 
 mod arm;
 mod arm_study;

@@ -1,6 +1,7 @@
-//! The funnel of a scene and a path: level, region, object, occlusion, triangle and
-//! fragment, each stage with interchangeable back ends, compared with the exact truth and
-//! timed. The back ends are in [`crate::visibility`]; this module reads them off.
+//! The funnel of a scene and a path: stages with interchangeable back ends.
+//!
+//! Level, region, object, occlusion, triangle and fragment, each compared with the exact truth
+//! and timed. The back ends are in [`crate::visibility`]; this module reads them off.
 //!
 //! A [`Chain`] names a back end for each stage. The study compares it with every chain
 //! that differs from it in one stage: [`prepare`] counts, [`time`] measures in each

@@ -1,6 +1,7 @@
-//! Sixteen boxes side by side: the layout in which leaves and scans test their
-//! items. It defines the block kernels; each lane computes exactly what
-//! [`Plane::excludes`] computes for one box.
+//! Sixteen boxes side by side: the layout that leaves and scans test.
+//!
+//! Defines the block kernels; each lane computes exactly what [`Plane::excludes`] computes for
+//! one box.
 
 use glam::{Vec3, Vec4};
 

@@ -1,5 +1,6 @@
-//! Planes as the block kernels read them: which rows of a block are a plane's
-//! corners, and its numbers in vectors for many blocks.
+//! Planes as the block kernels read them.
+//!
+//! The rows of a block that are a plane's corners, and its numbers in vectors for many blocks.
 
 use super::balls::{Unit, decide, distances, splat};
 use super::box_block::{BoxBlock, sums_at};

@@ -1,5 +1,6 @@
-//! The query volume: an intersection of at most 32 half-spaces, with the six
-//! planes of a frustum named.
+//! The query volume: an intersection of at most 32 half-spaces.
+//!
+//! The six planes of a frustum are named.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};

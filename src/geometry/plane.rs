@@ -1,6 +1,8 @@
-//! The plane and THE plane test. Every structure, kernel and cross-check of
-//! this crate goes through the arithmetic of [`Plane::value_at`]; changing one
-//! operation of it changes what the whole toolkit calls visible.
+//! The plane and THE plane test.
+//!
+//! Every structure, kernel and cross-check of this crate goes through the arithmetic of
+//! [`Plane::value_at`]; changing one operation of it changes what the whole toolkit calls
+//! visible.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,7 @@
-//! The plane test about a moving zero: boxes are taken relative to the eye
-//! before they meet the planes, as engines with large worlds do. Far from the
-//! scene's zero this keeps the digits that `n . x + d` would cancel.
+//! The plane test about a moving zero.
+//!
+//! Boxes are taken relative to the eye before they meet the planes, as engines with large
+//! worlds do. Far from the scene's zero this keeps the digits that `n . x + d` would cancel.
 
 use glam::Vec3;
 

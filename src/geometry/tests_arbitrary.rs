@@ -1,5 +1,6 @@
-//! Numbers, vectors and boxes for property tests: those on which f32 arithmetic
-//! ties, overflows or vanishes, beside ordinary ones.
+//! Numbers, vectors and boxes for property tests.
+//!
+//! Those on which f32 arithmetic ties, overflows or vanishes, beside ordinary ones.
 
 use glam::Vec3;
 use proptest::prelude::*;

@@ -1,6 +1,7 @@
-//! The test of one box at a time, for the uniform grid and the structures of other
-//! crates; prepared once per query. Structures that test plane by plane with masks use
-//! [`QueryVolume`] itself.
+//! The test of one box at a time, prepared once per query.
+//!
+//! For the uniform grid and the structures of other crates. Structures that test plane by plane
+//! with masks use [`QueryVolume`] itself.
 
 use std::ops::ControlFlow;
 

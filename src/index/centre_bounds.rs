@@ -1,6 +1,7 @@
-//! Bounds of the centres of a query's answers, for an index that searches boxes or
-//! cells only. Every item that the six-plane test sees has its centre within them; not
-//! every item within them is seen.
+//! Bounds of the centres of a query's answers.
+//!
+//! For an index that searches boxes or cells only. Every item that the six-plane test sees has
+//! its centre within them; not every item within them is seen.
 
 use glam::{DVec3, Vec3};
 

@@ -1,5 +1,7 @@
-//! The contract of a structure, [`RegionIndex`]: build, memory, one generic query.
-//! [`FrustumQuery`] provides the forms of the query that callers use.
+//! The contract of a structure, [`RegionIndex`].
+//!
+//! Build, memory, one generic query. [`FrustumQuery`] provides the forms of the query that
+//! callers use.
 
 use std::ops::{ControlFlow, Range};
 

@@ -1,6 +1,7 @@
-//! A uniform grid as engines have it: equal cells over the scene, each item in
-//! the cell of its centre, cells with the exact bounds of their items. A query visits
-//! the cells that its bounds reach. (Grids on crates.io are hash maps for moving
+//! A uniform grid as engines have it: equal cells over the scene.
+//!
+//! Each item is in the cell of its centre, and cells have the exact bounds of their items. A
+//! query visits the cells that its bounds reach. (Grids on crates.io are hash maps for moving
 //! bodies.)
 
 use std::hint::black_box;

@@ -1,5 +1,6 @@
-//! The declaration of a structure: name, kind, origin, capabilities. Each structure
-//! is checked against it by the conformance suite.
+//! The declaration of a structure: name, kind, origin, capabilities.
+//!
+//! The conformance suite checks each structure against it.
 
 use std::fmt;
 

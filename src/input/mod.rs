@@ -1,5 +1,7 @@
-//! Reading what users give: the error that names the place, files and pipes, and
-//! CSV tables with a header. The formats themselves belong to `scene` and `path`.
+//! Reading what users give: errors, files and pipes, CSV tables.
+//!
+//! Errors name the place; tables have a header. The formats themselves belong to `scene` and
+//! `path`.
 
 mod error;
 mod file;

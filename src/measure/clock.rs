@@ -1,5 +1,6 @@
-//! The two clocks: thread CPU time for ranking (a shared machine may take the
-//! core away), wall time beside it.
+//! The two clocks: thread CPU time and wall time.
+//!
+//! CPU time ranks, because a shared machine may take the core away; wall time stands beside it.
 
 use std::time::Instant;
 

@@ -1,5 +1,6 @@
-//! Origin of a figure: machine, toolchain and source. A fact that cannot be
-//! found out is null, never a guess.
+//! Origin of a figure: machine, toolchain and source.
+//!
+//! A fact that cannot be found out is null, never a guess.
 
 use std::fs;
 use std::path::Path;

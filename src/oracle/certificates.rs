@@ -1,6 +1,7 @@
-//! From half-spaces to certificates: every way in which at most four of them
-//! together can shut out a box. Boxes are tested against certificates in
-//! `evaluate`.
+//! Certificates of half-spaces.
+//!
+//! Every way in which at most four of them together can shut out a box. Boxes are tested
+//! against certificates in `evaluate`.
 //!
 //! P is the intersection of half-spaces `n_i.x + d_i >= 0`, B a box. By
 //! Farkas' lemma they have no common point iff some non-negative combination

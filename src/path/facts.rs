@@ -1,5 +1,6 @@
-//! Lenses of cameras as used, matrices as they were read, and doubts about cameras:
-//! another up axis, broken matrices, eyes far outside, empty views.
+//! Lenses of cameras as used, matrices as read, and doubts about cameras.
+//!
+//! Doubts are another up axis, broken matrices, eyes far outside, empty views.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,7 @@
-//! A walk through doors at constant eye height: the portals of rooms, the two-sided
-//! linedefs of a Doom map. Furniture and steps are no obstacles.
+//! A walk through doors at constant eye height.
+//!
+//! Doors are the portals of rooms and the two-sided linedefs of a Doom map. Furniture and steps
+//! are no obstacles.
 
 use glam::{DVec2, DVec3};
 

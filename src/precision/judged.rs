@@ -1,5 +1,6 @@
-//! Answers of a culling to every camera by the plain loop, and their errors. No
-//! structure and no clock.
+//! Answers of a culling to every camera by the plain loop, and their errors.
+//!
+//! No structure and no clock.
 
 use glam::DVec3;
 use serde::ser::Error as _;

@@ -1,7 +1,7 @@
-//! Error against run time: what each culling test, arithmetic and derivation
-//! of the planes gets wrong, and what it costs on each structure. It owns the
-//! points of that diagram and the sweeps; the truth is the oracle's, the clock is
-//! `measure`'s.
+//! Error against run time of culling tests, arithmetic and plane derivations.
+//!
+//! Errors of each, and its time on each structure. Owns the points of that diagram
+//! and the sweeps; the truth is the oracle's, the clock is `measure`'s.
 
 mod judged;
 mod point;

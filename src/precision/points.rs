@@ -1,5 +1,7 @@
-//! Points of the diagram of one scene and path: every structure with every
-//! culling, checked, judged against the exact truth, and timed side by side.
+//! Points of the diagram of one scene and path.
+//!
+//! Every structure with every culling, checked, judged against the exact truth, and timed side
+//! by side.
 
 use serde::Serialize;
 

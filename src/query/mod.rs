@@ -1,5 +1,6 @@
-//! Parts of a query: its volume, the ids of its answer, and its context of sink,
-//! recorder and instruction set.
+//! Parts of a query: its volume, the ids of its answer, and its context.
+//!
+//! A context has a sink, a recorder and an instruction set.
 
 mod context;
 mod dispatched;

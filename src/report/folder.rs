@@ -1,7 +1,8 @@
-//! The folder of a run: stream.jsonl and samples.csv, appended to as the run
-//! continues, and report.json and summary.csv, made of them at its end. Those are
-//! written beside their place and renamed into it, so that a reader or a crash
-//! never meets half a file.
+//! The folder of a run.
+//!
+//! stream.jsonl and samples.csv are appended to as the run continues; report.json and
+//! summary.csv are made of them at its end. Those are written beside their place and renamed
+//! into it, so that a reader or a crash never meets half a file.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};

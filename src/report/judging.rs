@@ -1,6 +1,7 @@
-//! Outcome of one cell between an old measurement and a new one: two reports,
-//! or two programs that ran in turns. One row type for both, the metrics that
-//! may be judged, and the counters that are compared exactly.
+//! Outcome of one cell between an old measurement and a new one.
+//!
+//! Measurements are two reports, or two programs that ran in turns. One row type for both, the
+//! metrics that may be judged, and the counters that are compared exactly.
 
 use std::cmp::Ordering;
 

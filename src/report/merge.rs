@@ -1,6 +1,7 @@
-//! Joining the shards of one plan into the run that they are together: what
-//! must not be mixed is refused by name, and the groups come in the order of
-//! the whole plan.
+//! Joining the shards of one plan into the run that they are together.
+//!
+//! Shards that must not be mixed are refused by name, and the groups come in the order of the
+//! whole plan.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};

@@ -1,6 +1,7 @@
-//! Reports: the versioned model that other tools read, the folder of a run in
-//! which every finished cell is on disk before the next begins, and what can be
-//! read off a report. It defines the formats; the figures come from `measure`.
+//! Reports: the model that other tools read, and the folder of a run.
+//!
+//! The model is versioned; in the folder every finished cell is on disk before the next begins.
+//! Also what can be read off a report. Defines the formats; the figures come from `measure`.
 
 mod changes;
 mod experiment;

@@ -1,5 +1,6 @@
-//! report.json: one run with everything needed to judge it. Readers ignore
-//! unknown fields; the JSON Schema in docs/ is generated from these types.
+//! report.json: one run with everything needed to judge it.
+//!
+//! Readers ignore unknown fields; the JSON Schema in docs/ is generated from these types.
 
 use std::collections::BTreeSet;
 

@@ -1,6 +1,7 @@
-//! Reading what runs have left: a report, or the stream behind it, whole or
-//! stopped at any moment. Every error says where, what was found and what was
-//! expected.
+//! Reading what runs have left: a report, or the stream behind it.
+//!
+//! The stream may be whole or stopped at any moment. Every error says where, what was found and
+//! what was expected.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

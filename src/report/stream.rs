@@ -1,6 +1,7 @@
-//! The stream of a run: one JSON line for each part as soon as it is measured,
-//! appended and never rewritten, and the report that is made of them. Whatever
-//! ends a run, the lines that are there are whole but for the last.
+//! The stream of a run: one JSON line for each part as soon as it is measured.
+//!
+//! Lines are appended and never rewritten, and the report is made of them. Whatever ends a run,
+//! the lines that are there are whole but for the last.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -1,6 +1,7 @@
-//! The crossover surface: which structure wins where, over the number of items
-//! and the share of them that is visible, and from which size on a structure is
-//! faster than the linear scan. Read off a report; nothing is measured.
+//! The crossover surface: which structure wins where.
+//!
+//! Over the number of items and the share of them that is visible; also from which size on a
+//! structure is faster than the linear scan. Read off a report; nothing is measured.
 
 use std::mem::replace;
 

@@ -1,6 +1,7 @@
-//! Boxes as CSV: `min_x,min_y,min_z,max_x,max_y,max_z` and any further
-//! columns as labels; the item id is the zero-based data row. It defines the
-//! reading and writing of that one format.
+//! Reading and writing of boxes as CSV.
+//!
+//! `min_x,min_y,min_z,max_x,max_y,max_z` and any further columns as labels; the item id is the
+//! zero-based data row.
 
 use std::io::{self, Write};
 

@@ -1,5 +1,6 @@
-//! The 2-D BSP tree of a Doom map: the bounds of its leaves, and which leaf holds a
-//! point, exactly.
+//! The 2-D BSP tree of a Doom map.
+//!
+//! The bounds of its leaves, and which leaf holds a point, exactly.
 
 use std::ops::{Add, Mul, Sub};
 

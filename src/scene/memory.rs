@@ -1,5 +1,7 @@
-//! Memory that a scene needs, and memory that is free: a scene that does not fit is
-//! refused before it is made, as a machine that swaps measures nothing.
+//! Memory that a scene needs, and memory that is free.
+//!
+//! A scene that does not fit is refused before it is made, as a machine that swaps measures
+//! nothing.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,7 @@
-//! A scene: boxes in local f32 coordinates about an f64 origin, the triangles of a
-//! mesh, the regions for region search, and the scene's own camera places.
+//! A scene: boxes in local f32 coordinates about an f64 origin.
+//!
+//! Also the triangles of a mesh, the regions for region search, and the scene's own camera
+//! places.
 //!
 //! Generators and readers have a file each; this file defines their common output
 //! and the choice of the origin.

@@ -1,6 +1,7 @@
-//! An indoor block: storeys of box-shaped rooms joined by doors. The rooms tile the
-//! block and are the regions of region search; the doors are the portals between them;
-//! slabs, walls and furniture are the items.
+//! An indoor block: storeys of box-shaped rooms joined by doors.
+//!
+//! The rooms tile the block and are the regions of region search; the doors are the portals
+//! between them; slabs, walls and furniture are the items.
 
 use glam::DVec3;
 

@@ -1,5 +1,6 @@
-//! Doom maps: linedefs and things as boxes, the map's own BSP leaves as
-//! regions, its things as camera places.
+//! Doom maps: linedefs and things as boxes.
+//!
+//! The map's own BSP leaves are regions, its things are camera places.
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,5 +1,6 @@
-//! Parsers of option values. Their errors state what was expected; the command line
-//! adds the option and the value.
+//! Parsers of option values.
+//!
+//! Their errors state what was expected; the command line adds the option and the value.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;

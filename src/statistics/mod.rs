@@ -1,6 +1,7 @@
 //! The statistics of a report: quantiles, intervals, tests, verdicts, ranks.
-//! Pure functions of numbers; each names its source. Nothing else in the crate
-//! computes an interval.
+//!
+//! Pure functions of numbers; each names its source. Nothing else in the crate computes an
+//! interval.
 
 pub mod flat;
 mod judgement;

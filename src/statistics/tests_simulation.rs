@@ -1,9 +1,10 @@
-//! The estimators before a mock clock: how often do intervals hold the truth,
-//! how often is a verdict false, how often is a change found? The clock has the
-//! variances that were measured on a shared machine of two virtual cores, as
-//! standard deviations of logarithms: processes 16-18 %, rounds of a process
-//! 17-20 % with two speeds (1.15 against 1.75 to 2.0, autocorrelation 0.25),
-//! memory layout up to 1.1 %, the difference of a pair of processes 3 %.
+//! The estimators before a mock clock.
+//!
+//! How often do intervals hold the truth, how often is a verdict false, how often is a change
+//! found? The clock has the variances that were measured on a shared machine of two virtual
+//! cores, as standard deviations of logarithms: processes 16-18 %, rounds of a process 17-20 %
+//! with two speeds (1.15 against 1.75 to 2.0, autocorrelation 0.25), memory layout up to 1.1 %,
+//! the difference of a pair of processes 3 %.
 
 use rand::RngExt;
 use rand::SeedableRng;

@@ -1,5 +1,6 @@
-//! The stiff and extreme suite: test vectors and generated extremes on every
-//! structure, at planes and at camera level. This file defines the rows that come out.
+//! The stiff and extreme suite: test vectors and generated extremes.
+//!
+//! On every structure, at planes and at camera level. This file defines the rows that come out.
 
 pub mod extremes;
 mod replay;

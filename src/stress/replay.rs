@@ -1,5 +1,7 @@
-//! Test vectors on structures: the given planes bit for bit, the camera through
-//! the default pipeline, points, and boxes that must be refused.
+//! Test vectors on structures.
+//!
+//! The given planes bit for bit, the camera through the default pipeline, points, and boxes
+//! that must be refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,5 @@
 //! Test vectors: boxes, cameras or planes with the answers of exact arithmetic.
+//!
 //! Fields have the names of the JSON files; numbers and names have readers.
 
 use std::collections::BTreeSet;

@@ -1,7 +1,8 @@
-//! Cross-checking structures: the reference answer by the plainest loop there
-//! is, the comparison with it, and the first difference in words. Random and
-//! degenerate scenes and volumes are in `cases`, the contract of a structure as tests
-//! in [`conformance`]. Nothing here is timed.
+//! Cross-checking structures: the reference answer, and the comparison with it.
+//!
+//! The reference is the plainest loop there is; the first difference is put in words. Random
+//! and degenerate scenes and volumes are in `cases`, the contract of a structure as tests in
+//! [`conformance`]. Nothing here is timed.
 
 mod cases;
 pub mod conformance;

@@ -1,7 +1,7 @@
-//! A trial: one question with its right answer, put to one structure after
-//! another. It guards against panics, compares with the reference, and names the
-//! first item that differs. `run`, `verify`, `precision` and `stress` ask in no
-//! other way.
+//! A trial: one question with its right answer, put to several structures.
+//!
+//! It guards against panics, compares with the reference, and names the first item that
+//! differs. `run`, `verify`, `precision` and `stress` ask in no other way.
 
 use super::{Difference, scan};
 use crate::geometry::Aabb;

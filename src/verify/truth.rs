@@ -1,5 +1,6 @@
-//! The truth about a scene and a camera, item by item, and how an answer
-//! differs from it: false negatives, dropped touches, false positives. The
+//! The truth about a scene and a camera, item by item.
+//!
+//! Also how an answer differs from it: false negatives, dropped touches, false positives. The
 //! verdicts are the oracle's; nothing is timed here.
 
 use crate::camera::Camera;

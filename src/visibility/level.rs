@@ -1,5 +1,6 @@
-//! The level stage, the lecture's user selection: of the maps in a file, only the
-//! chosen one is loaded at all.
+//! The level stage, the lecture's user selection.
+//!
+//! Only the chosen one of the maps in a file is loaded at all.
 
 use std::path::Path;
 use std::sync::Arc;

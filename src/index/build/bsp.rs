@@ -1,5 +1,6 @@
-//! The BSP tree: planes divide the items, and region search descends by the planes
-//! alone. Includes the import of a map's own tree, whose planes have any orientation;
+//! The BSP tree: planes divide the items, and points descend by them alone.
+//!
+//! Includes the import of a map's own tree, whose planes have any orientation;
 //! `bsp_split_planes` has the choice of planes.
 
 use glam::Vec3;

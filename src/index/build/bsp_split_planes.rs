@@ -1,6 +1,7 @@
-//! Choice of a plane for a group of items: by the median or by surface areas. Each
-//! function moves the items behind its plane to the front of the slice and returns
-//! their number.
+//! Choice of a plane for a group of items: by the median or by surface areas.
+//!
+//! Each function moves the items behind its plane to the front of the slice and returns their
+//! number.
 
 use glam::{DVec3, Vec3};
 

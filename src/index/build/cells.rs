@@ -1,6 +1,7 @@
-//! Octree and quadtree: regular subdivision into cells. An item descends with its
-//! centre, and nodes are fitted to their items, so that items across a split plane
-//! cost a little overlap and never a collapse.
+//! Octree and quadtree: regular subdivision into cells.
+//!
+//! An item descends with its centre, and nodes are fitted to their items, so that items across
+//! a split plane cost a little overlap and never a collapse.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,6 @@
-//! Builders of packed trees, each an implementation of
-//! [`TreeBuilder`](super::tree::TreeBuilder).
+//! Builders of packed trees.
+//!
+//! Each implements [`TreeBuilder`](super::tree::TreeBuilder).
 //!
 //! `bvh` (its clustering in `ploc`), `bsp` (its choice of planes in `bsp_split_planes`),
 //! and `cells` with octree and quadtree.

@@ -1,7 +1,9 @@
-//! The binary tree that crate obvhs builds: the steps of its helper `build_bvh2`
-//! without the validation that ends it in debug builds. That one recurses once a
-//! level and compares with a depth noted before reinsertion, which may have made the
-//! tree deeper: deep trees panic or overflow the stack. No walk here relies on either.
+//! The binary tree that crate obvhs builds.
+//!
+//! The steps of its helper `build_bvh2` without the validation that ends it in debug builds.
+//! That one recurses once a level and compares with a depth noted before reinsertion, which may
+//! have made the tree deeper: deep trees panic or overflow the stack. No walk here relies on
+//! either.
 //!
 //! The crate takes quadratic time where few neighbours agree in a round of clustering,
 //! as in a row of posts or of growing boxes, and where boxes lie in one another. Here

@@ -1,8 +1,9 @@
-//! The scan of a game engine, after the visibility system of Bevy: one record
-//! an entity with its flags and bounds, one test after the other, the flag set,
-//! the visible ones listed. A stand-in, not Bevy's own code: `bevy_camera`
-//! brings two hundred crates, and its test (centre and half-extents, a sphere
-//! first) rounds differently, so its answers could not be compared.
+//! The scan of a game engine, after the visibility system of Bevy.
+//!
+//! One record an entity with its flags and bounds, one test after the other, the flag set, the
+//! visible ones listed. A stand-in, not Bevy's own code: `bevy_camera` brings two hundred
+//! crates, and its test (centre and half-extents, a sphere first) rounds differently, so its
+//! answers could not be compared.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,6 +1,8 @@
-//! The crate obvhs by its own tree: its nodes in its order, its ids through
-//! `primitive_indices`. It has no frustum traversal, so its public nodes are walked as
-//! its own traversals do. The structure `bvh` reorders a tree of the same builder.
+//! The crate obvhs by its own tree.
+//!
+//! Its nodes in its order, its ids through `primitive_indices`. It has no frustum traversal, so
+//! its public nodes are walked as its own traversals do. The structure `bvh` reorders a tree of
+//! the same builder.
 
 use std::ops::ControlFlow;
 

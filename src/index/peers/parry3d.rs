@@ -1,5 +1,6 @@
-//! The crate parry3d's BVH: its default build, queried through `traverse_indexed`,
-//! which lets whole subtrees be accepted.
+//! The crate parry3d's BVH in its default build.
+//!
+//! Queried through `traverse_indexed`, which lets whole subtrees be accepted.
 
 use std::ops::ControlFlow;
 

@@ -1,7 +1,8 @@
-//! The trees as lectures show them: nodes with child pointers, a recursive walk,
-//! one box at a time, no SIMD. Compared with the packed trees they show the effect of
-//! a layout; compared with the scan, of a tree. Here are the node and the walk;
-//! `divisions` has a division per kind of tree.
+//! The trees as lectures show them: child pointers and a recursive walk.
+//!
+//! One box at a time, no SIMD. Compared with the packed trees they show the effect of a layout;
+//! compared with the scan, of a tree. Here are the node and the walk; `divisions` has a
+//! division per kind of tree.
 //!
 //! The walk does not depend on the instruction set, so it is compiled once for all.
 

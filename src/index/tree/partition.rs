@@ -1,6 +1,7 @@
-//! Top-down construction, shared by octree, quadtree and BSP tree: the order of
-//! work, the leaves, and the fallback for groups that cannot be divided. A splitter
-//! decides how a group of items is divided.
+//! Top-down construction, shared by octree, quadtree and BSP tree.
+//!
+//! The order of work, the leaves, and the fallback for groups that cannot be divided. A
+//! splitter decides how a group of items is divided.
 
 use super::packed::PackedTree;
 use crate::index::items::Record;

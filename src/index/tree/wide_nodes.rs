@@ -1,5 +1,6 @@
-//! The nodes of a tree grouped sixteen to a block, so that a query by a volume
-//! tests sixteen nodes at once. Layout, construction and refit.
+//! The nodes of a tree grouped sixteen to a block.
+//!
+//! A query by a volume tests sixteen nodes at once. Layout, construction and refit.
 
 use std::collections::VecDeque;
 

@@ -1,5 +1,6 @@
-//! One level of a query of the wide tree: the test of its blocks, and of the leaves
-//! at the end.
+//! One level of a query of the wide tree.
+//!
+//! The test of its blocks, and of the leaves at the end.
 
 use std::ops::{ControlFlow, Range};
 

@@ -1,5 +1,6 @@
-//! The wide tree: sixteen children per node, no pointers, one block of 384 bytes
-//! for each node and each leaf. Layout, construction, queries, refit.
+//! The wide tree: sixteen children per node, no pointers.
+//!
+//! One block of 384 bytes for each node and each leaf. Layout, construction, queries, refit.
 
 mod auto;
 mod block_order;

@@ -1,6 +1,8 @@
-//! The nodes of a frontier in buckets: one for each plane that is the only open one
-//! of its nodes, and the rest. So a plane's coefficients are prepared once for all of
-//! its nodes, without unpredictable branches between them.
+//! The nodes of a frontier in buckets, by the plane that alone is open.
+//!
+//! One bucket for each plane that is the only open one of its nodes, and one for the rest. So a
+//! plane's coefficients are prepared once for all of its nodes, without unpredictable branches
+//! between them.
 
 use crate::geometry::LANES;
 use crate::index::frontier::{Frontier, NodeList};

@@ -1,5 +1,6 @@
-//! Appending to a list through its spare memory: a row is stored whole, whichever
-//! lanes count, and the list's length is set once.
+//! Appending to a list through its spare memory.
+//!
+//! A row is stored whole, whichever lanes count, and the list's length is set once.
 
 use std::ops::Range;
 

@@ -1,6 +1,7 @@
-//! Quake III maps (IBSP of version 46): surfaces and brushes as items, with their
-//! triangles; the open leaves of the map's own BSP tree as regions; spawn points as camera
-//! places.
+//! Quake III maps (IBSP of version 46).
+//!
+//! Surfaces and brushes are items, with their triangles; the open leaves of the map's own BSP
+//! tree are regions; spawn points are camera places.
 //!
 //! Moving parts are where the file has them, and coordinates are its own.
 

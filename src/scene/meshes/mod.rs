@@ -1,5 +1,7 @@
-//! Generated meshes: scenes of triangles, each from a number of triangles and a
-//! seed. One file a mesh; the table `MESHES` in `generate` names them all.
+//! Generated meshes: scenes of triangles.
+//!
+//! Each is made from a number of triangles and a seed. One file a mesh; the table `MESHES` in
+//! `generate` names them all.
 
 pub mod ground;
 pub mod spheres;

@@ -1,5 +1,6 @@
-//! Generated extremes: families of seeded cases with their outcome declared,
-//! and the loop that runs them.
+//! Generated extremes: families of seeded cases, and the loop that runs them.
+//!
+//! Each case declares its outcome.
 
 mod cameras;
 mod check;

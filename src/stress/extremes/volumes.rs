@@ -1,6 +1,7 @@
-//! Extremes at planes level: volumes without an end, with many planes and
-//! with no point at all; inverted, flat and coincident boxes; and numbers so
-//! small that flushing them to zero would change the answer.
+//! Extremes at planes level.
+//!
+//! Volumes without an end, with many planes and with no point at all; inverted, flat and
+//! coincident boxes; and numbers so small that flushing them to zero would change the answer.
 
 use glam::Vec3;
 

@@ -1,6 +1,8 @@
-//! The properties of every structure, one function per property of the contract in
-//! [`RegionIndex`]. [`conformance!`](crate::conformance) makes a test of each; an
-//! error names the difference and the scene.
+//! The properties of every structure, one function per property.
+//!
+//! They are the properties of the contract in [`RegionIndex`].
+//! [`conformance!`](crate::conformance) makes a test of each; an error names the difference and
+//! the scene.
 
 mod behaviour;
 mod questions;

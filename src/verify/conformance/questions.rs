@@ -1,5 +1,6 @@
-//! Queries of the properties: volumes and points of a scene, and the comparison of
-//! an answer with the reference.
+//! Queries of the properties: volumes and points of a scene.
+//!
+//! Also the comparison of an answer with the reference.
 
 use std::ops::{ControlFlow, Range};
 

@@ -1,6 +1,7 @@
-//! Boxes within closed meshes: what a mesh hides at the least. A search on a grid
-//! of cells proposes boxes (`cells`); exact tests prove that no triangle enters them and
-//! that they are inside.
+//! Boxes within closed meshes: what a mesh hides at the least.
+//!
+//! A search on a grid of cells proposes boxes (`cells`); exact tests prove that no triangle
+//! enters them and that they are inside.
 //!
 //! (Inscribed boxes as occluders: Silvennoinen, Saransaari, Laine and Lehtinen 2014,
 //! "Occluder simplification using planar sections", name the voxel approach.)

@@ -1,6 +1,7 @@
-//! Masked depth buffers: per tile of 8 x 4 pixels two depths and one bit a pixel
-//! (Hasselgren, Andersson, Akenine-Moeller 2016, "Masked software occlusion
-//! culling", High Performance Graphics), 12 bytes a tile.
+//! Masked depth buffers: two depths and a bit a pixel per tile of 8 x 4.
+//!
+//! Hasselgren, Andersson, Akenine-Moeller 2016, "Masked software occlusion culling", High
+//! Performance Graphics. 12 bytes a tile.
 //!
 //! The layout and the rule of merging are the paper's; outlines instead of
 //! triangles and everything else is not. Two coverage rules, and nothing else,

@@ -1,6 +1,7 @@
-//! A camera as the occlusion stage needs it: where the rays of an image are, as
-//! linear functions of the place in the image (f64, for what is drawn), and where a
-//! point is in the image (f32, for the sixteen boxes of a block).
+//! A camera as the occlusion stage needs it.
+//!
+//! Rays of an image, as linear functions of the place in the image (f64, for what
+//! is drawn), and a point's place in it (f32, for the sixteen boxes of a block).
 //!
 //! The image has x from 0 to width and y from 0, the top, to height: the pixel in
 //! column c and row r is the closed square `[c, c + 1] x [r, r + 1]`.

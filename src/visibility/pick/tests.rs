@@ -1,5 +1,6 @@
-//! Back ends against arithmetic on integers of any size, which shares nothing
-//! with theirs.
+//! Back ends against arithmetic on integers of any size.
+//!
+//! It shares nothing with theirs.
 
 mod triangles;
 

@@ -1,5 +1,6 @@
-//! Rectangles of openings in the image, in camera coordinates: right, up, and the
-//! depth along the axis of view.
+//! Rectangles of openings in the image, in camera coordinates.
+//!
+//! Right, up, and the depth along the axis of view.
 //!
 //! All are grown by a slack, so that no rounding ever loses a line of sight. The slack's
 //! proof is at [`SLACK`].

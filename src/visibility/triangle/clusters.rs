@@ -1,5 +1,6 @@
-//! Clusters: at most 64 neighbouring triangles of an item, a bit of a word each.
-//! All of a cluster are of one kind and alike in sides.
+//! Clusters: at most 64 neighbouring triangles of an item.
+//!
+//! Each triangle is a bit of a word. All of a cluster are of one kind and alike in sides.
 //!
 //! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer
 //! grows meshlets). Deterministic.

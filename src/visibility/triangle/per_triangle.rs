@@ -1,5 +1,7 @@
-//! Every triangle for itself, exactly: sixteen planes at a time in f32 with a bound
-//! on the error, and the exact test where that does not decide.
+//! Every triangle for itself, exactly.
+//!
+//! Sixteen planes at a time in f32 with a bound on the error, and the exact test where that
+//! does not decide.
 //!
 //! Normals are scaled so that their largest component is about 1. Let u = 2^-24, E
 //! the error of the f32 eye. The way from corner to eye is off by E and u of itself,

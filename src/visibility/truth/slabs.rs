@@ -1,5 +1,6 @@
-//! A ray as the sixteen-fold slab tests take it: in f32, with numbers that bound
-//! its depths from both sides. It owns the error analysis.
+//! A ray as the sixteen-fold slab tests take it: in f32.
+//!
+//! Numbers bound its depths from both sides. It owns the error analysis.
 //!
 //! A box side `b` (f32, local) is crossed at `t = (s - o) / d`, where `s` is the
 //! true side, within 2^-23 `|b|` of `b` (the box was rounded outward by less than

@@ -1,5 +1,6 @@
-//! Sixteen boxes at once: their rectangles hold the boxes, and asking for all of
-//! them is asking for each.
+//! Sixteen boxes at once against each alone.
+//!
+//! Their rectangles hold the boxes, and asking for all of them is asking for each.
 
 use glam::DVec3;
 

@@ -1,5 +1,7 @@
-//! Boxes in the solid of a map: what its walls, floors and ceilings enclose from
-//! outside, in pieces that are simple enough to be drawn as occluders.
+//! Boxes in the solid of a map.
+//!
+//! Pieces of what its walls, floors and ceilings enclose from outside, simple enough to be drawn
+//! as occluders.
 //!
 //! Open is what lies above some sector between its floor and its ceiling; everything
 //! else is solid. Where all sectors close, no ray leaves the open without meeting a

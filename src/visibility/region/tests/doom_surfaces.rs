@@ -1,5 +1,6 @@
-//! A map as surfaces against the same map as sectors: two ways to visibility that
-//! share only the lumps.
+//! A map as surfaces against the same map as sectors.
+//!
+//! Two ways to visibility that share only the lumps.
 
 use std::sync::Arc;
 

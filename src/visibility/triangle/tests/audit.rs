@@ -1,6 +1,7 @@
-//! A search for lost triangles: eyes next to the boundary of a cluster's cone, of
-//! flat, thin and far clusters. What a back end removes is compared with the exact
-//! test.
+//! A search for lost triangles.
+//!
+//! Eyes next to the boundary of a cluster's cone, of flat, thin and far clusters. What a back
+//! end removes is compared with the exact test.
 
 use std::sync::Arc;
 

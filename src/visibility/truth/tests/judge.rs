@@ -1,5 +1,6 @@
-//! The truth once more, by whole numbers of any length and without an index: what
-//! the tests hold everything else against.
+//! The truth by whole numbers of any length, without an index.
+//!
+//! The tests compare everything else with it.
 
 use std::cmp::Ordering;
 
