@@ -69,14 +69,15 @@ pub(crate) use erased::QueryMany;
 pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
-pub use items::{IdSet, Record, indexable};
+pub(crate) use items::Record;
+pub use items::{IdSet, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
 #[cfg(feature = "cli")]
 pub(crate) use registry::{DEFAULT, MOTION};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::Tree;
+use tree::TreeBuilder;
 #[cfg(feature = "cli")]
 pub(crate) use tree::node::{NEAR, Stack};
-pub(crate) use tree::{Built, PackedTree, Part, Splitter, TreeBuilder, build_top_down};
 pub use wide::{Auto, AutoParams, BlockOrder, Moving, Wide, WideParams};

@@ -261,8 +261,9 @@ impl Splitter for CellSplitter<'_> {
 mod tests {
     use super::*;
     use crate::geometry::ConvexVolume;
+    use crate::index::tree::PackedTree;
     use crate::index::tree::node::is_leaf;
-    use crate::index::{PackedTree, RegionIndex, StructureSpec};
+    use crate::index::{RegionIndex, StructureSpec};
     use crate::query::QueryCost;
 
     #[test]

@@ -33,7 +33,6 @@ use super::{BuildError, Info, Input, MemoryUsage, RegionIndex, TreeCell};
 use crate::geometry::Aabb;
 use crate::query::{Context, ItemId, QueryVolume};
 
-pub use node::TreeNode;
 pub use packed::PackedTree;
 pub use partition::{Part, Splitter, build_top_down};
 

@@ -46,8 +46,8 @@ fn by_hand(tree: &PackedTree, p: Vec3, out: &mut Vec<ItemId>) {
 #[test]
 fn a_recorder_that_is_off_changes_no_region_search() {
     // Residues by primes: boxes that overlap all over a cube.
-    let place =
-        |i: u32| Vec3::from_array([7_919, 104_729, 611_953].map(|k| (i * k % 1_000) as f32));
+    let axes = [(919, 1_009), (729, 1_013), (953, 1_019)];
+    let place = |i: u32| Vec3::from_array(axes.map(|(k, all)| (i * k % all) as f32));
     let items = (0..20_000).map(|i| Aabb::around(place(i), Vec3::splat(10.0)));
     let items: Vec<Aabb> = items.collect();
     let octree = Octree::build(&Input::new(&items), &Default::default()).expect("a tree");
