@@ -84,13 +84,13 @@ pub const MOVED_AHEAD: usize = 24;
 
 impl Positions {
     /// Computes the positions of the ids in `order`, at the first call. O(items), once.
-    pub fn prepare(&mut self, order: &[ItemId], items: usize) {
+    pub fn prepare<'a>(&mut self, order: impl IntoIterator<Item = &'a ItemId>, items: usize) {
         let is_first = self.0.is_empty();
         if self.0.len() < items {
             self.0.resize(items, ABSENT);
         }
         if is_first {
-            for (&id, position) in order.iter().zip(0..) {
+            for (&id, position) in order.into_iter().zip(0..) {
                 self.0[id as usize] = position;
             }
         }

@@ -250,7 +250,7 @@ impl RegionIndex for Linear {
     ///
     /// A pass over all blocks more where the farthest sphere has come nearer.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.positions.prepare(&self.ids, items.len());
+        self.positions.prepare(self.ids.iter(), items.len());
         for (i, &id) in moved.iter().enumerate() {
             if let Some(position) = self.positions.ahead(items, moved, i) {
                 self.boxes.prefetch(position);

@@ -8,10 +8,9 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{place_of, placed};
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
-use crate::index::items::Record;
+use crate::index::items::{Positions, Record};
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{Context, ItemId};
 
@@ -29,6 +28,19 @@ struct Entity {
 /// All entities in the order of the scene.
 pub struct PeerBevyStyle {
     entities: Vec<Entity>,
+    positions: Positions,
+}
+
+impl From<Record> for Entity {
+    fn from(item: Record) -> Entity {
+        Entity {
+            item,
+            layers: LAYER,
+            inherited_visibility: !item.bounds.is_empty(),
+            no_frustum_culling: false,
+            view_visibility: AtomicBool::new(false),
+        }
+    }
 }
 
 /// The layer of every view.
@@ -45,25 +57,28 @@ impl BoxTested for PeerBevyStyle {
     type Params = NoParams;
 
     fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
-        let entity = |item| Entity {
-            item,
-            layers: LAYER,
-            inherited_visibility: true,
-            no_frustum_culling: false,
-            view_visibility: AtomicBool::new(false),
-        };
         let mut entities = Vec::with_capacity(items.len());
-        entities.extend(items.into_iter().map(entity));
-        Ok(PeerBevyStyle { entities })
+        entities.extend(items.into_iter().map(Entity::from));
+        Ok(PeerBevyStyle {
+            entities,
+            positions: Positions::default(),
+        })
     }
 
-    /// Overwrites the bounds; an entity that is gone is hidden.
+    /// Overwrites the bounds; an entity that is gone is hidden, a new one spawned.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let place = |id| place_of(&self.entities, |e| e.item.id, id);
-        for (at, bounds) in placed(place, items, moved, true)? {
-            let entity = &mut self.entities[at];
-            entity.item.bounds = bounds;
-            entity.inherited_visibility = !bounds.is_empty();
+        let ids = self.entities.iter().map(|entity| &entity.item.id);
+        self.positions.prepare(ids, items.len());
+        for &id in moved {
+            let bounds = items[id as usize];
+            if let Some(at) = self.positions.of(id) {
+                let entity = &mut self.entities[at];
+                entity.item.bounds = bounds;
+                entity.inherited_visibility = !bounds.is_empty();
+            } else {
+                self.positions.set(id, self.entities.len() as u32);
+                self.entities.push(Record { bounds, id }.into());
+            }
         }
         Some(())
     }
@@ -71,7 +86,7 @@ impl BoxTested for PeerBevyStyle {
     fn used(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: 0,
-            item_bytes: size_of_val(&self.entities[..]),
+            item_bytes: size_of_val(&self.entities[..]) + self.positions.bytes(),
         }
     }
 

@@ -8,10 +8,9 @@ use ::bvh::aabb::{Aabb as CrateAabb, Bounded, IntersectsAabb};
 use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh, BvhNode};
 
-use super::{place_of, placed};
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
-use crate::index::items::Record;
+use crate::index::items::{Positions, Record};
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{Context, ItemId, Recorder};
 
@@ -110,6 +109,7 @@ pub struct PeerBvh {
     tree: Bvh<f32, 3>,
     shapes: Vec<Shape>,
     scaled: bool,
+    positions: Positions,
 }
 
 impl BoxTested for PeerBvh {
@@ -136,39 +136,65 @@ impl BoxTested for PeerBvh {
             tree,
             shapes,
             scaled,
+            positions: Positions::default(),
         })
     }
 
-    /// `Bvh::update_shapes`, which removes and adds shape by shape, or a build.
+    /// `remove_shape` and `add_shape`, as `update_shapes` calls them, or a build.
     ///
     /// A build is faster where most shapes have moved, and needed where areas overflow.
+    /// The shape of an item that is gone stays in the list, empty and without a node.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        let place = |id| place_of(&self.shapes, |s| s.item.id, id);
-        let placed = placed(place, items, moved, false)?;
-        let overflows = |(_, b): &(usize, Aabb)| b.reach().max_element() > LARGEST;
+        let ids = self.shapes.iter().map(|shape| &shape.item.id);
+        self.positions.prepare(ids, items.len());
+        let mut moved = moved.to_vec();
+        // The crate adds a shape as often as it is named.
+        moved.sort_unstable();
+        moved.dedup();
+        let (mut removed, mut added, mut overflows) = (Vec::new(), Vec::new(), false);
+        for id in moved {
+            let mut bounds = items[id as usize];
+            let at = self.positions.of(id).unwrap_or(self.shapes.len());
+            match self.shapes.get_mut(at) {
+                Some(shape) => std::mem::swap(&mut shape.item.bounds, &mut bounds),
+                None => {
+                    self.positions.set(id, at as u32);
+                    let item = Record { bounds, id };
+                    self.shapes.push(Shape { item, node: 0 });
+                    bounds = Aabb::EMPTY;
+                }
+            }
+            removed.extend((!bounds.is_empty()).then_some(at));
+            let bounds = self.shapes[at].item.bounds;
+            added.extend((!bounds.is_empty()).then_some(at));
+            overflows |= !bounds.is_empty() && bounds.reach().max_element() > LARGEST;
+        }
         let count = self.shapes.len();
         let eighths = if count > LARGE { 3 } else { 6 };
-        let builds = placed.len() * 8 >= count * eighths;
-        let builds = builds || self.scaled || placed.iter().any(overflows);
-        let mut changed: Vec<usize> = placed.iter().map(|(at, _)| *at).collect();
-        // The crate adds a shape as often as it is named.
-        changed.sort_unstable();
-        changed.dedup();
-        for (at, bounds) in placed {
-            self.shapes[at].item.bounds = bounds;
+        let changed = removed.len().max(added.len());
+        if changed * 8 >= count * eighths || self.scaled || overflows {
+            let held = self.shapes.iter().map(|shape| shape.item);
+            let held: Vec<Record> = held.filter(|item| !item.bounds.is_empty()).collect();
+            let built = Self::of(held, &NoParams {}).ok()?;
+            let old = std::mem::replace(self, built);
+            if self.shapes.len() == count {
+                self.positions = old.positions;
+            }
+            return Some(());
         }
-        if builds {
-            let built = Self::of(self.shapes.iter().map(|s| s.item).collect(), &NoParams {});
-            return built.map(|built| *self = built).ok();
+        for at in removed {
+            self.tree.remove_shape(&mut self.shapes, at, false);
         }
-        self.tree.update_shapes(&changed, &mut self.shapes);
+        for at in added {
+            self.tree.add_shape(&mut self.shapes, at);
+        }
         Some(())
     }
 
     fn used(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: self.tree.nodes.capacity() * size_of::<BvhNode<f32, 3>>(),
-            item_bytes: size_of_val(&self.shapes[..]),
+            item_bytes: size_of_val(&self.shapes[..]) + self.positions.bytes(),
         }
     }
 

@@ -11,49 +11,17 @@ mod obvhs;
 mod parry3d;
 mod rstar;
 
-use crate::geometry::Aabb;
-use crate::query::ItemId;
-
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::PeerBvh;
 pub use obvhs::{ObvhsParams, ObvhsUpdate, PeerObvhs};
 pub use parry3d::{Parry3dParams, Parry3dUpdate, PeerParry3d};
 pub use rstar::PeerRstar;
 
-/// Index of an item in a list ascending by id. O(log n), O(1) if no item is empty.
-fn place_of<T>(held: &[T], id_of: impl Fn(&T) -> ItemId, id: ItemId) -> Option<usize> {
-    match held.get(id as usize) {
-        Some(own) if id_of(own) == id => Some(id as usize),
-        _ => held.binary_search_by_key(&id, id_of).ok(),
-    }
-}
-
-/// Moved items by the places that a peer holds them at, with their new bounds.
-///
-/// `None` if one ceases to be empty, or becomes so where an empty item keeps no place.
-fn placed(
-    place_of: impl Fn(ItemId) -> Option<usize>,
-    items: &[Aabb],
-    moved: &[ItemId],
-    keeps_empty: bool,
-) -> Option<Vec<(usize, Aabb)>> {
-    let mut placed = Vec::with_capacity(moved.len());
-    for &id in moved {
-        let bounds = items[id as usize];
-        match place_of(id) {
-            Some(at) if keeps_empty || !bounds.is_empty() => placed.push((at, bounds)),
-            None if bounds.is_empty() => {}
-            _ => return None,
-        }
-    }
-    Some(placed)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::geometry::{ConvexVolume, Plane};
+    use crate::geometry::{Aabb, ConvexVolume, Plane};
     use crate::index::{DynIndex, StructureSpec};
+    use crate::query::ItemId;
     use glam::Vec3;
 
     fn sorted(index: &dyn DynIndex, volume: &ConvexVolume) -> Vec<ItemId> {
@@ -135,15 +103,36 @@ mod tests {
                     assert_eq!(sorted(&*index, volume), wanted, "{text} frame {frame}");
                 }
             }
-            let held = std::mem::replace(&mut items[8], Aabb::new(Vec3::ONE, Vec3::ZERO));
-            let builds = ["peer-obvhs", "peer-bvh"].map(|own| text.starts_with(own));
-            let follows = !builds.contains(&true);
-            assert_eq!(index.refit(&items, &[8]), follows, "{text}");
+            let empty = Aabb::new(Vec3::ONE, Vec3::ZERO);
             let all = ConvexVolume::from_planes(&[]).expect("no planes");
-            for count in if follows { &[898, 899][..] } else { &[] } {
-                assert_eq!(sorted(&*index, &all).len(), *count);
-                items[8] = held;
-                assert!(index.refit(&items, &[8]));
+            for frame in 0..60_u32 {
+                // All come or go in the last frames.
+                let step = [61, 17, 1][frame as usize / 20];
+                let moved: Vec<u32> = (frame % 7..900).step_by(step).collect();
+                for &id in &moved {
+                    let b = &mut items[id as usize];
+                    *b = match b.is_empty() {
+                        true => Aabb::around(at((id * 31 + frame) % 900) * 2.0, Vec3::ONE),
+                        false if id % 3 == frame % 3 => Aabb::around(at(id), Vec3::ONE),
+                        false => empty,
+                    };
+                }
+                assert!(index.refit(&items, &moved), "{text} frame {frame}");
+                for volume in volumes.iter().chain([&all]) {
+                    let held = items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
+                    let seen = held.filter(|(b, _)| volume.sees(b));
+                    let wanted: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+                    assert_eq!(sorted(&*index, volume), wanted, "{text} frame {frame}");
+                }
+            }
+            let ids: Vec<u32> = (0..900).collect();
+            for held in [empty, Aabb::around(Vec3::ONE, Vec3::ONE)] {
+                items.fill(held);
+                assert!(index.refit(&items, &ids), "{text}: all at once");
+                assert_eq!(
+                    sorted(&*index, &all).len(),
+                    [900, 0][usize::from(held.is_empty())]
+                );
             }
         }
     }

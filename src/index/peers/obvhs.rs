@@ -11,10 +11,9 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use serde::{Deserialize, Serialize};
 
-use super::placed;
 use crate::geometry::Aabb;
 use crate::index::box_test::{BoxQuery, BoxTest, BoxTested};
-use crate::index::items::{Positions, Record};
+use crate::index::items::{ABSENT, Positions, Record};
 use crate::index::tree::node::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{Context, ItemId};
@@ -31,7 +30,7 @@ pub struct ObvhsParams {
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObvhsUpdate {
-    /// `refit_from` for each leaf, or `refit_all` from one moved item in 32 on.
+    /// `resize_node` for each leaf, or `refit_all` from one moved item in 32 on.
     #[default]
     Refit,
     /// `move_primitive`; leaves of several items are refitted.
@@ -49,6 +48,8 @@ pub struct PeerObvhs {
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
     positions: Positions,
+    /// Numbers of the crate's primitives that were removed.
+    free: Vec<u32>,
     update: ObvhsUpdate,
 }
 
@@ -58,6 +59,37 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
 }
 
 impl PeerObvhs {
+    /// Removes an item; the last one of its leaf takes its place, as the crate has it.
+    fn remove(&mut self, id: ItemId, place: usize) {
+        let primitive = self.bvh.primitive_indices[place];
+        let leaf = &self.bvh.nodes[self.bvh.primitives_to_nodes[primitive as usize] as usize];
+        let last = (leaf.first_index + leaf.prim_count - 1) as usize;
+        self.bvh.remove_primitive(primitive);
+        self.free.push(primitive);
+        self.ids[place] = self.ids[last];
+        if !self.boxes.is_empty() {
+            self.boxes[place] = self.boxes[last];
+        }
+        self.positions.set(self.ids[place], place as u32);
+        self.positions.set(id, ABSENT);
+    }
+
+    /// Inserts an item as a leaf of its own.
+    fn insert(&mut self, id: ItemId, bounds: Aabb) {
+        let primitive = self.free.pop().unwrap_or(self.ids.len() as u32);
+        let own = obvhs::aabb::Aabb::new(bounds.min.into(), bounds.max.into());
+        let node = self.bvh.insert_primitive(own, primitive);
+        let place = self.bvh.nodes[node].first_index;
+        let places = self.bvh.primitive_indices.len();
+        self.ids.resize(places, id);
+        self.ids[place as usize] = id;
+        if !self.boxes.is_empty() {
+            self.boxes.resize(places, bounds);
+            self.boxes[place as usize] = bounds;
+        }
+        self.positions.set(id, place);
+    }
+
     /// Tests the items of a leaf that was not rejected.
     #[inline(always)]
     fn leaf<T: BoxTest + ?Sized, C: Context>(
@@ -122,14 +154,25 @@ impl BoxTested for PeerObvhs {
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        self.positions.prepare(&self.ids, items.len());
-        let placed = placed(|id| self.positions.of(id), items, moved, false)?;
+        self.positions.prepare(self.ids.iter(), items.len());
         self.bvh.init_primitives_to_nodes_if_uninit();
-        let all = placed.len() * ALL_SHARE >= self.ids.len();
+        let mut stay = Vec::with_capacity(moved.len());
+        for &id in moved {
+            let b = items[id as usize];
+            match self.positions.of(id) {
+                Some(_) if !b.is_empty() => stay.push(id),
+                Some(place) => self.remove(id, place),
+                None if !b.is_empty() => self.insert(id, b),
+                None => {}
+            }
+        }
+        let all = stay.len() * ALL_SHARE >= self.ids.len();
         let moves = self.update == ObvhsUpdate::Move && self.boxes.is_empty();
-        for (place, b) in placed {
-            let primitive = self.bvh.primitive_indices[place];
+        for id in stay {
+            let place = self.positions.of(id)?;
+            let b = items[id as usize];
             let mut bounds = obvhs::aabb::Aabb::new(b.min.into(), b.max.into());
+            let primitive = self.bvh.primitive_indices[place];
             if moves {
                 self.bvh.move_primitive(bounds, primitive);
                 continue;

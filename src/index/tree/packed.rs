@@ -158,7 +158,7 @@ impl PackedTree {
         moved: &[ItemId],
         mut fitted: impl FnMut(&PackedTree, usize),
     ) -> bool {
-        self.positions.prepare(&self.ids, items.len());
+        self.positions.prepare(self.ids.iter(), items.len());
         let stays = |&id: &ItemId| self.positions.of(id).is_none() == items[id as usize].is_empty();
         if !moved.iter().all(stays) {
             return false;

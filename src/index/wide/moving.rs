@@ -127,7 +127,7 @@ impl Moving {
 
     /// Makes homes and regions, once, and room for as many items.
     fn prepare(&mut self, items: usize) {
-        self.positions.prepare(&self.still.ids, items);
+        self.positions.prepare(self.still.ids.iter(), items);
         self.moved.resize(items.max(self.moved.len()), REST);
         if self.regions.is_empty() {
             let leaves = self.still.occupied.len();

@@ -17,7 +17,7 @@ impl Wide {
 
     /// The leaves alone; returns those that have changed.
     pub(super) fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<Dirty> {
-        self.positions.prepare(&self.ids, items.len());
+        self.positions.prepare(self.ids.iter(), items.len());
         let enters =
             |&id: &ItemId| self.positions.of(id).is_none() && !items[id as usize].is_empty();
         if items.len() > self.ids.len() && moved.iter().any(enters) {
