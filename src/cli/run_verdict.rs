@@ -57,6 +57,36 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
     told.join(" ")
 }
 
+/// The oldest structures where queries take over twice a fresh build's time.
+///
+/// Each by its worst scene, path and motion; of the others the tree that ages least.
+fn ageing(all: &[&Comparison]) -> Option<String> {
+    let mut worst = BTreeMap::<&str, f64>::new();
+    let longest = ["1000", "100", "10"].into_iter().find(|frames| {
+        let cells = all.iter().flat_map(|c| c.sound());
+        for cell in cells.filter(|cell| !cell.structure.starts_with(YARDSTICK)) {
+            if let Some(ratio) = cell.value(&format!("ageing_{frames}")) {
+                let most = worst.entry(&cell.structure).or_default();
+                *most = most.max(ratio);
+            }
+        }
+        !worst.is_empty()
+    })?;
+    let mut aged: Vec<(&str, f64)> = worst.into_iter().collect();
+    aged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let old = aged.iter().take(4).filter(|(_, ratio)| *ratio > 2.0);
+    let old: Vec<String> = old
+        .map(|(name, x)| format!("{} ({name})", times(*x)))
+        .collect();
+    let kept = aged.last().filter(|(_, ratio)| *ratio <= 2.0);
+    let kept = text::some(kept, |(name, x)| format!("; {name} stays at {}", times(*x)));
+    let most = ["up to ", ""][usize::from(all.len() == 1)];
+    let old = (!old.is_empty()).then(|| listed(&old, "and"))?;
+    Some(format!(
+        "Queries age: after {longest} frames they take {most}{old} as long as on a fresh build{kept}."
+    ))
+}
+
 /// Remarks on rebuilds that do not come, and on dropped contacts.
 fn caveats(all: &[&Comparison]) -> Vec<String> {
     let late = all.iter().flat_map(|c| &c.cells).filter_map(|cell| {
@@ -67,6 +97,7 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
         is_late.then(|| format!("@every={every}: no rebuild in {frames}."))
     });
     let mut told: Vec<String> = late.collect::<BTreeSet<_>>().into_iter().collect();
+    told.extend(ageing(all));
     let dropped = all.iter().filter_map(|c| c.of_any("touch_dropped_count"));
     let dropped = dropped.fold(0.0, f64::max);
     if dropped > 0.0 {

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use serde_json::json;
+
 use super::process::*;
 use super::runs::{cells, report};
 use super::{BOXES, EYE_LOOK};
@@ -204,6 +206,24 @@ fn a_motion_is_an_axis_of_a_run() {
     }
     let whole = report(&at("r"));
     assert_eq!(cells(&whole).len(), 8);
+    let mut aged = whole.clone();
+    for cell in aged["cells"].as_array_mut().expect("cells") {
+        let swarms = cell["path"]["motion"].to_string().contains("swarm");
+        let name = cell["structure"].as_str().expect("a name");
+        let ratio = match name {
+            "wide" if swarms => 29.04,
+            "wide" | "octree" => 2.5,
+            _ => 1.9,
+        };
+        let own = json!({"value": ratio, "lower": null, "upper": null, "unit": "1"});
+        cell["metrics"]["ageing_10"] = own;
+    }
+    fs::create_dir(at("aged")).expect("a folder");
+    fs::write(at("aged/report.json"), aged.to_string()).expect("writable");
+    let wanted = "Queries age: after 10 frames they take up to 29.0 x (wide) and 2.50 x (octree) \
+        as long as on a fresh build; bvh stays at 1.90 x.";
+    let found = unwrapped(&works(folder.path(), "report aged"));
+    assert!(found.contains(wanted), "{found}");
     for cell in cells(&whole) {
         assert_eq!(cell["status"], "ok", "{cell}");
         let of = |name: &str| number(&cell["metrics"][name], "value");
