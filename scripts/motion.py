@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Writes the section "What moves" of docs/MOTION.md from results/motion.
 
-usage: scripts/motion.py [CULLBENCH]
+usage: scripts/motion.py [CULLBENCH [STEP ..]]
 
-With an optimised CULLBENCH of the feature `peers` the runs are measured first (some minutes)
-and stored in results/motion.
+With an optimised CULLBENCH of the feature `peers` the steps (all of them, or those named) are
+measured first and stored in results/motion: about 20 minutes on one core.
 """
 
 import csv
+import gzip
+import io
 import json
 import subprocess
 import sys
@@ -16,116 +18,225 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "results" / "motion"
+CELLS = RESULTS / "summary.csv.gz"
 PAGE = ROOT / "docs" / "MOTION.md"
 
-SCENES = ["uniform:n=100000", "city:n=100000"]
-MOTIONS = [f"{motion},frames=100" for motion in
-           ["drift:share=0.1%", "drift:share=1%", "drift:share=10%", "drift:share=100%",
-            "drift:share=1%,same=false", "shuffle:share=1%", "shuffle:share=10%"]]
-VIEWS = [1, 16]
-COLUMNS = ["scene", "motion", "views_per_frame", "structure", "status", "rank", "frame_ns",
-           "update_ns", "query_ns", "worst_frame_ns", "ageing_10", "ageing_100",
-           "memory_after_bytes_per_item"]
-OTHERS = ["wide", "moving", "peer-obvhs"]
+SCENES = ["uniform:n=100000", "city:n=100000", "helsinki"]
+MILLION = ["uniform:n=1000000"]
+STEPS_OF = [f"drift:share={share}" for share in ["0.1%", "1%", "1%,same=false", "10%", "100%"]]
+JUMPS = ["shuffle:share=1%", "shuffle:share=1%,same=false", "shuffle:share=10%"]
+OURS = ["linear", "wide", "moving", "auto"]
+PEERS = ["peer-obvhs", "peer-parry3d"]
+ALL = [*PEERS, "peer-bvh", "peer-rstar", "peer-bevy-style"]
+# Scenes, motions, frames, views per frame, structures, policies.
+STEPS = {
+    "frames": (SCENES, STEPS_OF + JUMPS, 100, 1, OURS + PEERS, "refit"),
+    "views": (SCENES, STEPS_OF[1:2] + STEPS_OF[3:] + JUMPS, 100, 16, OURS + PEERS[:1], "refit"),
+    "million": (MILLION, STEPS_OF[1:4] + JUMPS[:1], 30, 1, OURS + PEERS, "refit"),
+    "updates": (SCENES + MILLION, [STEPS_OF[1], *STEPS_OF[3:], JUMPS[2]], 40, 1, ["wide"],
+                "refit,every=20,rebuild"),
+    "peers": (["uniform:n=100000", "helsinki"], [STEPS_OF[1], JUMPS[0]], 100, 1, ["wide", *ALL],
+              "refit"),
+    "spawn": (SCENES, ["spawn:share=1%"], 100, 1, OURS + ALL, "refit"),
+    "thousand": (["uniform:n=20000", "city:n=20000", "helsinki"],
+                 [STEPS_OF[1], STEPS_OF[3], *JUMPS], 1000, 1, OURS[1:], "refit"),
+}
 
 
-def measure(program):
+def measured(program, step):
+    """The rows of summary.csv of a step, and what is known of the machine."""
+    scenes, motions, frames, views, structures, policies = STEPS[step]
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "run"
+        command = [program, "run", "--structure", ",".join(structures), "--no-bounds",
+                   "--path", "flythrough:frames=24,visible=2%", "--views", str(views),
+                   "--update", policies, "--processes", "3", "--out", str(out)]
+        for scene in scenes:
+            command += ["--scene", scene]
+        for motion in motions:
+            command += ["--motion", f"{motion},frames={frames}"]
+        if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
+            sys.exit(f"motion.py: `run` of step {step} failed; expected exit code 0")
+        with open(out / "summary.csv", newline="") as table:
+            rows = [{"step": step, **row} for row in csv.DictReader(table)]
+        report = json.loads((out / "report.json").read_text())
+    return rows, {"cpu": report["machine"]["cpu"], "date": report["run"]["started_at"][:10]}
+
+
+def cells():
+    with gzip.open(CELLS, "rt", newline="") as table:
+        return list(csv.DictReader(table))
+
+
+def measure(program, steps):
     RESULTS.mkdir(exist_ok=True)
-    found = []
-    for views in VIEWS:
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "run"
-            command = [program, "run", "--structure", "linear," + ",".join(OTHERS), "--no-bounds",
-                       "--path", "flythrough:frames=24,visible=2%", "--views", str(views),
-                       "--processes", "3", "--out", str(out)]
-            for scene in SCENES:
-                command += ["--scene", scene]
-            for motion in MOTIONS:
-                command += ["--motion", motion]
-            if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
-                sys.exit("motion.py: `run` failed; expected exit code 0")
-            with open(out / "summary.csv", newline="") as table:
-                found += [{key: row[key] for key in COLUMNS} for row in csv.DictReader(table)]
-            report = json.loads((out / "report.json").read_text())
-    with open(RESULTS / "frames.csv", "w", newline="") as table:
-        writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
+    found = [row for row in (cells() if CELLS.exists() else []) if row["step"] not in steps]
+    for step in steps:
+        rows, about = measured(program, step)
+        found += rows
+        # After each step, so that one that fails does not cost the others.
+        found.sort(key=lambda row: list(STEPS).index(row["step"]))
+        columns = list(dict.fromkeys(key for row in found for key in row if row[key]))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")
         writer.writeheader()
         writer.writerows(found)
-    about = {"cpu": report["machine"]["cpu"], "date": report["run"]["started_at"][:10]}
-    (RESULTS / "about.json").write_text(json.dumps(about) + "\n")
+        CELLS.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
+        (RESULTS / "about.json").write_text(json.dumps(about) + "\n")
 
 
 def number(value):
-    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+    """Two significant digits, without an exponent."""
+    return f"{value:,.0f}" if value >= 99.5 else f"{value:.2g}"
 
 
-def ratio(text):
-    return number(float(text)) if text else "–"
+def us(cell, metric="frame_ns"):
+    return number(float(cell[metric]) / 1000) if cell and cell[metric] else "–"
 
 
-def fastest(cells):
-    """The fastest structures with frame and worst frame in us."""
-    cells = sorted((c for c in cells if c["status"] == "ok"), key=lambda c: float(c["frame_ns"]))
-    first = cells[0]
-    tied = [c["structure"] for c in cells if float(c["frame_ns"]) < 1.05 * float(first["frame_ns"])]
-    return (f"{', '.join(tied)} {number(float(first['frame_ns']) / 1000)} "
-            f"({number(float(first['worst_frame_ns']) / 1000)})")
+def ratio(cell, metric):
+    return number(float(cell[metric])) if cell and cell.get(metric) else "–"
 
 
-def lines():
-    with open(RESULTS / "frames.csv", newline="") as table:
-        cells = list(csv.DictReader(table))
-    for motion in MOTIONS:
-        law, _, rest = motion.partition(":")
-        share = rest.split(",")[0].removeprefix("share=").replace("%", " %")
-        changing = ", others in every frame" if "same=false" in motion else ""
-        for scene in SCENES:
-            own = [c for c in cells if c["motion"] == motion and c["scene"] == scene]
-            shown = [f"{law} {share}{changing}", scene.split(":")[0]]
-            shown += [fastest([c for c in own if c["views_per_frame"] == str(n)]) for n in VIEWS]
-            one = {c["structure"]: c for c in own if c["views_per_frame"] == "1"}
-            aged = [ratio(one[name]["ageing_100"]) for name in OTHERS]
-            yield "| " + " | ".join([*shown, ", ".join(aged)]) + " |"
+def worst(cell):
+    """The slowest frame / the mean."""
+    slowest = cell["worst_frame_ns"]
+    return number(float(slowest) / time_of(cell)) if slowest else "–"
 
 
-def cost_of_jumps(name):
-    """Least and most us that a jump adds to an update."""
-    with open(RESULTS / "frames.csv", newline="") as table:
-        cells = list(csv.DictReader(table))
-    costs = []
-    for share in [0.01, 0.1]:
-        motion = f"shuffle:share={share:.0%},"
-        own = [c for c in cells if c["structure"] == name and c["motion"].startswith(motion)]
-        costs += [float(c["update_ns"]) / (share * 100_000) / 1000 for c in own]
-    return f"{min(costs):#.2g} to {max(costs):#.2g}"
+def named(motion):
+    """"drift:share=1%,same=false,frames=100" as "drift 1 %, others"."""
+    law, _, rest = motion.partition(":")
+    share = rest.split(",")[0].removeprefix("share=").replace("%", " %")
+    return f"{law} {share}" + (", others" if "same=false" in motion else "")
+
+
+def short(scene):
+    name, _, count = scene.partition(":n=")
+    short = {"1000000": " 1M", "100000": " 100k", "20000": " 20k"}
+    return name + short.get(count, "")
+
+
+def groups(step):
+    """Motion, scene and the cells by structure, in the order of the step."""
+    scenes, motions, frames = STEPS[step][:3]
+    own = [cell for cell in cells() if cell["step"] == step]
+    for motion in motions:
+        for scene in scenes:
+            here = {c["structure"]: c for c in own if c["status"] == "ok"
+                    and c["motion"] == f"{motion},frames={frames}" and c["scene"] == scene}
+            if here:
+                yield named(motion), short(scene), here
+
+
+def time_of(cell):
+    return float(cell["frame_ns"])
+
+
+def best(here, names):
+    """The fastest of some structures."""
+    return min((here[name] for name in names if name in here), key=time_of, default=None)
+
+
+def row(*columns):
+    return "| " + " | ".join(columns) + " |"
+
+
+def frames(step):
+    """Frame in us of each structure, the fastest bold, and of the fastest peer."""
+    for motion, scene, here in groups(step):
+        least = time_of(best(here, OURS))
+        shown = [us(here.get(name)) for name in OURS]
+        shown = [f"**{text}**" if name in here and time_of(here[name]) < 1.05 * least else text
+                 for name, text in zip(OURS, shown)]
+        peer = best(here, ALL)
+        name = peer["structure"].removeprefix("peer-")
+        last = ([worst(here[name]) for name in ["wide", "moving"]] if step == "million" else
+                [ratio(here[name], "ageing_100") for name in ["wide", "moving"]])
+        yield row(motion, scene, *shown, f"{name} {us(peer)}", number(least / time_of(peer)), *last)
+
+
+def updates():
+    """Frame and worst frame by policy, and from how many views on a rebuild pays."""
+    for motion, scene, here in groups("updates"):
+        names = ["wide", "wide@every=20", "wide@rebuild"]
+        shown = [f"{us(here[name])} ({us(here[name], 'worst_frame_ns')})" for name in names]
+        refit, rebuild = here["wide"], here["wide@rebuild"]
+        update = [float(c["update_ns"]) for c in (rebuild, refit)]
+        query = [float(c["query_ns"]) for c in (refit, rebuild)]
+        gain = query[0] - query[1]
+        # Of mean times, over a motion of 40 frames.
+        views = number((update[0] - update[1]) / gain) if gain > 0.1 * query[1] else "–"
+        yield row(motion, scene, *shown, views)
+
+
+def peers():
+    for step in ["peers", "spawn"]:
+        for motion, scene, here in groups(step):
+            yield row(motion, scene, *[us(here.get(name)) for name in ["wide", *ALL]])
+
+
+def thousand():
+    for motion, scene, here in groups("thousand"):
+        aged = [f"{ratio(here.get(n), 'ageing_100')}, {ratio(here.get(n), 'ageing_1000')}"
+                for n in OURS[1:3]]
+        spread = ", ".join(worst(here[name]) for name in OURS[1:])
+        yield row(motion, scene, *[us(here[name]) for name in OURS[1:]], *aged, spread)
+
+
+def table(header, lines):
+    columns = header.split(" | ")
+    return row(*columns) + "\n|" + "---|" * len(columns) + "\n" + "\n".join(lines) + "\n"
 
 
 HEAD = """## What moves
 
-Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}):
-100,000 items, views of 2 %, 100 frames. The fastest structures by frame (ties within 5 %), with the
-us of the first (its worst frame). *Ageing*: query time after 100 frames / that of a fresh build:
-{others}.
+Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}; one
+core of a shared machine, views of 2 %, three processes). *Others*: other items move in every frame.
+Helsinki has 11,065 boxes. Least times within 5 % are bold.
 
-| moved per frame | scene | one view | sixteen views | ageing |
-|---|---|---|---|---|
+### Frame by structure
+
+us of a frame with one view, mean of 100 frames; *peer*: the fastest by its own calls, of obvhs
+and parry3d, where items come and go of all; *best / peer*: our best frame / that; *ageing*: query
+time after 100 frames / on a fresh build.
+
 """
-JUMPS = """
-Update per jumping item (shuffle), us: `moving` {moving}, `wide` {wide}.
-"""
+
+
+def section(about):
+    head = "moved per frame | scene | linear | wide | moving | auto | peer | best / peer"
+    yield HEAD.format(**about)
+    yield table(f"{head} | ageing of wide | of moving", [*frames("frames"), *frames("spawn")])
+    yield "\nA million items, 30 frames; *worst*: the slowest frame / the mean:\n\n"
+    yield table(f"{head} | worst of wide | of moving", frames("million"))
+    yield "\nSixteen views a frame; *peer*: obvhs:\n\n"
+    yield table(f"{head} | ageing of wide | of moving", frames("views"))
+    yield "\nOther peers, us of a frame with one view ([PEERS](PEERS.md)):\n\n"
+    yield table("moved per frame | scene | wide | obvhs | parry3d | bvh | rstar | Bevy-style",
+                peers())
+    yield ("\n### Refit or rebuild\n\nFrame of `wide` in us (worst frame), one view, mean of 40 "
+           "frames; *views*: the\nqueries per frame from which on a rebuild in every frame pays.\n\n")
+    yield table("moved per frame | scene | refit | every=20 | rebuild | views", updates())
+    yield ("\n### After 1,000 frames\n\nFrame in us; ageing after 100 and 1,000 frames; worst frame "
+           "/ mean.\n\n")
+    yield table("moved per frame | scene | wide | moving | auto | ageing of wide | of moving | "
+                "worst: wide, moving, auto", thousand())
+
+
 NOTES = "\n### What follows\n"
 
 
 def main():
+    unknown = [step for step in sys.argv[2:] if step not in STEPS]
+    if unknown:
+        sys.exit(f"motion.py: {unknown[0]}; expected a step of {', '.join(STEPS)}")
     if len(sys.argv) > 1:
-        measure(sys.argv[1])
+        measure(sys.argv[1], sys.argv[2:] or list(STEPS))
     about = json.loads((RESULTS / "about.json").read_text())
-    before, _, section = PAGE.read_text().partition("## What moves\n")
-    notes = section.partition(NOTES)[2]
-    head = HEAD.format(**about, others=", ".join(OTHERS))
-    jumps = JUMPS.format(moving=cost_of_jumps("moving"), wide=cost_of_jumps("wide"))
-    table = "\n".join(lines()) + "\n"
-    PAGE.write_text(before.rstrip() + "\n\n" + head + table + jumps + NOTES + notes)
+    before, _, text = PAGE.read_text().partition("## What moves\n")
+    notes = text.partition(NOTES)[2]
+    PAGE.write_text(before.rstrip() + "\n\n" + "".join(section(about)) + NOTES + notes)
 
 
 if __name__ == "__main__":
