@@ -13,9 +13,9 @@ pub fn from_now_on_finish() {
     TO_FINISH.store(true, Ordering::Relaxed);
 }
 
-/// Ends a command that has nothing to keep, with an exit code and no message.
+/// Ends a command that has nothing to keep.
 #[derive(Debug, thiserror::Error)]
-#[error("interrupted")]
+#[error("interrupted: nothing was saved")]
 pub struct Interrupted;
 
 /// Returns true after a request to stop.
@@ -40,7 +40,11 @@ pub fn check() -> Result<(), Interrupted> {
 
 pub fn install() {
     let handler = || {
-        if ASKED.swap(true, Ordering::Relaxed) || !TO_FINISH.load(Ordering::Relaxed) {
+        let again = ASKED.swap(true, Ordering::Relaxed);
+        if again || !TO_FINISH.load(Ordering::Relaxed) {
+            if !again {
+                tell!("{Interrupted}");
+            }
             std::process::exit(130);
         }
         tell!("stopping at the next safe place; again ends at once");

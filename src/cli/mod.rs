@@ -160,7 +160,10 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
             tell_warnings();
             ExitCode::from(ending as u8)
         }
-        Err(error) if error.is::<Interrupted>() => ExitCode::from(Ending::Interrupted as u8),
+        Err(error) if error.is::<Interrupted>() => {
+            tell!("{error}");
+            ExitCode::from(Ending::Interrupted as u8)
+        }
         // A reader who left is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
