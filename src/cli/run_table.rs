@@ -12,6 +12,7 @@ use crate::culling::{Culling, CullingTest};
 use crate::measure::{CellKey, GroupKey, Metric, Status};
 use crate::path::CameraFacts;
 use crate::report::{Comparison, Overall, ReportCell, grouped, times_as_fast};
+use crate::shown::first_of;
 use crate::spec::parse_number;
 use crate::statistics::Estimate;
 
@@ -325,7 +326,7 @@ fn short_count(typed: &str) -> String {
     }
 }
 
-/// Reasons why cells are not ok, each once with the number of its measurements.
+/// Reasons why cells are not ok, each once with its scenes and paths.
 pub fn reasons(group: &[&Comparison]) -> Vec<String> {
     notes(group, |cell| {
         let reason = cell.reason.as_ref()?;
@@ -333,21 +334,26 @@ pub fn reasons(group: &[&Comparison]) -> Vec<String> {
     })
 }
 
-/// Choices of structures, each once with the number of its measurements.
+/// Choices of structures, each once with its scenes and paths.
 pub fn choices(group: &[&Comparison]) -> Vec<String> {
     notes(group, |cell| cell.chose.clone())
 }
 
 fn notes(group: &[&Comparison], of: impl Fn(&ReportCell) -> Option<String>) -> Vec<String> {
-    let cells = group.iter().flat_map(|c| c.cells.iter());
-    let cells = cells.chain(group.iter().flat_map(|c| &c.bounds));
-    let notes = cells.filter_map(|cell| Some((format!("{}: {}", cell.structure, of(cell)?), ())));
-    let lines = grouped(notes).into_iter().map(|(line, found)| {
-        let count = match group.len() {
+    let labels = labels(group);
+    let own = group.iter().zip(&labels).flat_map(|(one, label)| {
+        let cells = one.cells.iter().chain(&one.bounds);
+        cells.map(move |cell| (cell, label))
+    });
+    let notes =
+        own.filter_map(|(cell, label)| Some((format!("{}: {}", cell.structure, of(cell)?), label)));
+    let lines = grouped(notes).into_iter().map(|(line, on)| {
+        let places = match group.len() {
             1 => String::new(),
-            all => format!(" ({} of {all} measurements)", found.len()),
+            all if on.len() == all => " (on all)".to_owned(),
+            _ => format!(" (on {})", first_of(&on, 2)),
         };
-        text::plain(&line) + &count
+        text::plain(&line) + &places
     });
     lines.collect()
 }

@@ -340,6 +340,13 @@ fn what_auto_has_chosen_stands_in_cell_summary_and_notes() {
         assert_eq!(Some(summary[1]["chose"].as_str()), chose(1));
     };
     check("", "", ["", ""]);
+    // Of several scenes each line says on which.
+    let two = run.replace("--scene", "--scene uniform:n=300 --scene");
+    let told = unwrapped(&works(folder.path(), &two.replace("--out r", "--out two")));
+    let places = ["(on all)", "(on city 300 orbit)", "(on uniform 300 orbit)"];
+    let of_auto = told.matches("scan of all items, not ").count();
+    let placed: usize = places.map(|place| told.matches(place).count()).iter().sum();
+    assert!(of_auto > 0 && placed >= of_auto, "{told}");
     fs::remove_dir_all(folder.path().join("r")).expect("removable");
     check(
         "--motion drift:share=50%,frames=6",
