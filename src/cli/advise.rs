@@ -7,7 +7,7 @@ use super::args::AdviseArgs;
 use super::document::{Block, Column, Table, show};
 use super::processes::{Job, Message, Timing};
 use super::run_table::{heads, structures};
-use super::run_verdict::{gains, times};
+use super::run_verdict::{sharing, times};
 use super::study::{Study, load, note_solid};
 use super::text::{self, significant, some, time_within};
 use super::{Ending, print};
@@ -16,7 +16,7 @@ use crate::advise::{
 };
 use crate::index::Registry;
 use crate::measure::{
-    Effort, Group, Part, Plan, ProcessTimes, ReportCell, Setting, Share, SharedWork, YARDSTICK,
+    Effort, Group, Machine, Part, Plan, ProcessTimes, ReportCell, Setting, Share, YARDSTICK,
     cameras_within,
 };
 use crate::report::{Comparison, Experiment};
@@ -57,7 +57,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     let times = study.times(step, setting.path.lens_scale, &prepared.plan)?;
     let advice = prepared.conclude(&input, &times);
     note_solid(&setting.scene, args.format);
-    let table = || show(&blocks(&advice, args.all_columns));
+    let machine = Machine::capture();
+    let table = || show(&blocks(&advice, args, &machine));
     print(args.format, &advice, table)?;
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
@@ -117,7 +118,8 @@ pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<P
 }
 
 /// The advice, with the evidence if it is wanted.
-pub fn blocks(advice: &Advice, all_columns: bool) -> Vec<Block> {
+fn blocks(advice: &Advice, args: &AdviseArgs, machine: &Machine) -> Vec<Block> {
+    let all_columns = args.all_columns;
     let rows = &advice.structure.rows;
     let lines = heads(&compared(rows)).into_iter();
     let lines = lines.chain([text::over(advice.processes, advice.twin.as_ref())]);
@@ -130,11 +132,14 @@ pub fn blocks(advice: &Advice, all_columns: bool) -> Vec<Block> {
         let (status, why) = (row.status.name(), row.reason.as_ref()?);
         Some(format!("{}: {status}: {why}", row.structure))
     });
-    let threads = gains(&SharedWork::of(rows)).map(|gains| format!("Threads: {gains}"));
-    let more = [in_motion(advice), threads].into_iter().flatten();
+    let more = in_motion(advice).into_iter();
     let more = more.flat_map(|paragraph| [String::new(), paragraph]);
     let told = failed.chain([taken(advice)]).chain(more);
-    blocks.extend(told.chain(changes(advice)).map(Block::Line));
+    blocks.extend(told.map(Block::Line));
+    let threads = args.study.kernel.threads.iter().max();
+    let shared = threads.and_then(|threads| sharing(rows, *threads, machine));
+    blocks.extend(shared.into_iter().flatten());
+    blocks.extend(changes(advice).into_iter().map(Block::Line));
     blocks.push(Block::Table(rule_table(&advice.omissions, all_columns)));
     blocks.extend(Block::more(all_columns, "evidence: --all-columns"));
     blocks

@@ -115,7 +115,7 @@ pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
     let all = comparisons(report);
     let mut blocks = Vec::new();
     if all_columns {
-        blocks = details(&all, &BTreeMap::new());
+        blocks = details(report, &all, &BTreeMap::new());
     }
     for (_, group) in run_table::groups(&all) {
         let overall = Overall::of(&group);
@@ -126,6 +126,7 @@ pub fn shown(report: &Report, all_columns: bool, width: usize) -> Vec<Block> {
                 blocks.extend(run_table::heads(one).into_iter().map(Block::Line));
                 let table = run_table::structures(one, overall.base, false);
                 blocks.push(Block::Table(table.parts(width).swap_remove(0)));
+                blocks.extend(sharing(report, one).into_iter().flatten());
             }
             _ => blocks.extend(run_table::of_many(&group, &overall, width)),
         }
@@ -169,7 +170,7 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
             .map(String::as_str),
     );
     blocks.extend(warnings.map(|said| Block::Line(format!("Warning: {said}"))));
-    blocks.extend(details(&all, views));
+    blocks.extend(details(report, &all, views));
     let every: Vec<&Comparison> = all.iter().collect();
     blocks.extend(run_table::choices(&every).into_iter().map(Block::Line));
     blocks.extend(surface_tables::blocks(report));
@@ -185,7 +186,7 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
 }
 
 /// Every scene and path with all its figures.
-fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
+fn details(report: &Report, all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
     let path = |comparison: &Comparison| {
         let (scene, path) = (&comparison.about().scene, &comparison.about().path);
         [&scene.name, &path.name, &path.cache, &path.motion].map(String::clone)
@@ -202,10 +203,16 @@ fn details(all: &[Comparison], views: &BTreeMap<String, Views>) -> Vec<Block> {
             let base = Overall::of(&[comparison]).base;
             let own = views.get(&about.key().group.id());
             blocks.extend(of_comparison(comparison, base, own));
+            blocks.extend(sharing(report, comparison).into_iter().flatten());
         }
         blocks.extend(run_figures::errors(tests).map(Block::Figure));
     }
     blocks
+}
+
+fn sharing(report: &Report, comparison: &Comparison) -> Option<[Block; 3]> {
+    let threads = report.run.threads as usize;
+    run_verdict::sharing(comparison.sound(), threads, &report.machine)
 }
 
 fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {

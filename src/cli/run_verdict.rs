@@ -6,9 +6,10 @@
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::document::{Block, Table};
 use super::text;
-use crate::measure::{SharedWork, Status, YARDSTICK};
-use crate::report::{Comparison, Mean, Overall, ReportCell, times_as_fast};
+use crate::measure::{Machine, SharedWork, Status, YARDSTICK};
+use crate::report::{Comparison, Mean, Overall, ReportCell, grouped, times_as_fast};
 
 /// "a", "a and b", "a, b and c".
 fn listed<N: Borrow<str> + ToString>(names: &[N], last: &str) -> String {
@@ -49,7 +50,6 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
     }
     if let [one] = all {
         told.extend(repaid(one, base).filter(|_| !is_blind(one)));
-        told.extend(gains(&SharedWork::of(one.sound())));
     }
     told.extend(checked(all));
     told.extend(failed(all));
@@ -108,18 +108,45 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
     told
 }
 
-/// Wall time, gain and CPU time of work that threads share.
-pub fn gains(shared: &[SharedWork]) -> Option<String> {
-    let told = shared.iter().map(|work| {
-        let what = ["", " with shared views"][usize::from(work.shares_views)];
-        let cpu = text::some(work.cpu_ratio, |r| format!(", {} the CPU time", times(r)));
+/// Wall and CPU time of work that at most `threads` share, and what it gains.
+///
+/// `None` where no work is shared.
+pub fn sharing<'c>(
+    cells: impl IntoIterator<Item = &'c ReportCell>,
+    threads: usize,
+    machine: &Machine,
+) -> Option<[Block; 3]> {
+    let shared = SharedWork::of(cells);
+    shared.first()?;
+    let mut table =
+        Table::of("structure | threads share | > wall per query | > speed-up | > CPU time");
+    let what = |work: &SharedWork| ["each query", "the views"][usize::from(work.shares_views)];
+    for work in &shared {
+        let (name, cpu) = (work.structure.clone(), text::some(work.cpu_ratio, times));
         let (wall, gain) = (text::time(work.wall_ns), times(work.wall_gain));
-        format!("{}{what} {wall} ({gain}{cpu})", work.structure)
+        table.add_row([name, what(work).to_owned(), wall, gain, cpu]);
+    }
+    let groups = grouped(shared.iter().map(|work| (what(work), work)));
+    let gains = groups.into_iter().map(|(what, own)| {
+        let best = own
+            .iter()
+            .max_by(|a, b| a.wall_gain.total_cmp(&b.wall_gain));
+        let best = best.filter(|best| best.wall_gain > LEAST_GAIN);
+        let gain =
+            best.map(|best| format!("at most {} ({})", times(best.wall_gain), best.structure));
+        format!(
+            "{} from sharing {what}",
+            gain.as_deref().unwrap_or("no gain")
+        )
     });
-    let told: Vec<String> = told.collect();
-    let ranked = "CPU time of all threads ranks; wall time per view, and one thread's / it:";
-    (!told.is_empty()).then(|| format!("{ranked} {}.", told.join(", ")))
+    let busy = text::some(machine.busy(), |busy| format!("; {busy}"));
+    let gains = text::joined(gains);
+    let told = format!("{threads} threads: {gains}{busy}. CPU time ranks.");
+    Some([Block::Table(table), Block::line(""), Block::Line(told)])
 }
+
+/// Wall times nearer than this are the layout of memory.
+const LEAST_GAIN: f64 = 1.05;
 
 /// Returns true if the fastest of empty answers is no advice.
 fn is_blind(comparison: &Comparison) -> bool {

@@ -107,7 +107,15 @@ fn a_list_of_threads_enters_structures_that_share_a_query() {
     let here = folder(&[]);
     let line = "run --scene uniform:n=40000 --path orbit:frames=6 --structure linear,bvh \
                 --threads 1,2 --processes 2 --cold --out o";
-    works(here.path(), line);
+    let told = unwrapped(&works(here.path(), line));
+    for part in [
+        " threads share ",
+        " 2 threads: ",
+        " from sharing the views, ",
+        " from sharing each query",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
     let report = std::fs::read_to_string(here.path().join("o/report.json")).expect("a report");
     let report = json(&report);
     let cells = report["cells"].as_array().expect("an array");
