@@ -48,8 +48,8 @@ pub struct Turn {
     /// The fastest structure there.
     pub structure: String,
     /// Value on the axis at which both take the same time, between the two measured
-    /// values `lower` and `upper`: on one side of them the structure taken is ahead, on the
-    /// other it is shown not to be.
+    /// values `lower` and `upper`: at one of them the structure taken is shown to be ahead,
+    /// at the other to be behind. The value of the workload where both tie there.
     pub at: f64,
     /// Smaller of the two.
     pub lower: f64,
@@ -66,6 +66,8 @@ pub struct Change {
     pub here: f64,
     /// Smallest and largest measured value.
     pub measured: [f64; 2],
+    /// Reason for which only the workload itself was measured; else null.
+    pub not_varied: Option<String>,
     /// Turn below `here`; null if the advice holds down to the smallest value.
     pub below: Option<Turn>,
     /// Turn above `here`; likewise.
@@ -87,11 +89,13 @@ struct Changed {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Beside {
     /// Labels of the structures in question.
-    contenders: Vec<String>,
+    pub(super) contenders: Vec<String>,
     /// Label of the structure taken that is rebuilt, on the workload itself.
-    rebuilt: Option<String>,
+    pub(super) rebuilt: Option<String>,
     /// Values of the workload itself; `None` on an axis that it does not have.
     here: [Option<f64>; 3],
+    /// Reasons for which values of each axis were not measured.
+    refused: [Option<String>; 3],
     changed: Vec<Changed>,
 }
 
@@ -107,17 +111,19 @@ impl Beside {
             contenders,
             rebuilt,
             here,
-            changed: Vec::new(),
+            ..Beside::default()
         };
-        let mut wanted = vec![(None, 0.0); usize::from(beside.rebuilt.is_some())];
+        let is_choice = beside.contenders.len() > 1;
+        let mut wanted = vec![(None, 0.0); usize::from(beside.rebuilt.is_some() || is_choice)];
         // A choice needs two.
         let axes = AXES.into_iter().zip(here);
-        for ((axis, values), here) in axes.filter(|_| beside.contenders.len() > 1) {
+        for ((axis, values), here) in axes.filter(|_| is_choice) {
             let Some(here) = here else { continue };
             let whole = if axis == Axis::Items { here } else { 1.0 };
             let values = values.map(|value| value * whole).into_iter();
             let values = values.filter(|value| axis != Axis::Items || *value >= LEAST);
             let values = values.filter(|value| (value / here).max(here / value) >= APART);
+            beside.refused[axis as usize] = Some("the scene is too small for parts".to_owned());
             wanted.extend(values.map(|value| (Some(axis), value)));
         }
         progress("other numbers of items, shares in view and shares moved");
@@ -130,18 +136,26 @@ impl Beside {
                 known: None,
             };
             // No such workload: a share that the cameras do not reach, a recorded motion.
-            if let Some((reached, part)) = changed.measured(input, &beside) {
-                (changed.reached, changed.known) = (reached, part.known.clone());
-                beside.changed.push(changed);
-                parts.push(part);
+            match changed.measured(input, &beside) {
+                Ok((reached, part)) => {
+                    (changed.reached, changed.known) = (reached, part.known.clone());
+                    beside.changed.push(changed);
+                    parts.push(part);
+                }
+                Err(error) => {
+                    let own = axis.map(|axis| &mut beside.refused[axis as usize]);
+                    own.into_iter()
+                        .for_each(|why| *why = Some(error.to_string()));
+                }
             }
         }
         (beside, parts)
     }
 
-    /// True if the first workload is the one without a change, with rebuilds.
-    pub(super) fn has_rebuilds(&self) -> bool {
-        self.rebuilt.is_some() && self.changed.first().is_some_and(|c| c.axis.is_none())
+    /// Cells of the workload without a change, of the structures in question alone.
+    pub(super) fn here<'g>(&self, groups: &'g [Group]) -> Option<&'g [ReportCell]> {
+        let first = self.changed.first().zip(groups.first());
+        first.and_then(|(own, group)| own.axis.is_none().then_some(&group.cells[..]))
     }
 
     /// Measures the workloads in one process.
@@ -163,12 +177,12 @@ impl Beside {
         groups.collect()
     }
 
-    /// The dependence on each axis of which something was measured.
+    /// The dependence on each axis that the workload has.
     ///
     /// `here` are the cells of the workload itself.
     pub(super) fn changes(&self, here: &[ReportCell], groups: &[Group]) -> Vec<Change> {
-        let axes = AXES.iter().zip(self.here);
-        let changes = axes.filter_map(|(&(axis, _), value)| {
+        let axes = AXES.iter().zip(self.here).zip(&self.refused);
+        let changes = axes.filter_map(|((&(axis, _), value), refused)| {
             let (taken, value) = (self.contenders.first()?, value?);
             let own = self.changed.iter().zip(groups);
             let own = own.filter(|(changed, _)| changed.axis == Some(axis));
@@ -177,9 +191,11 @@ impl Beside {
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let middle = points.iter().position(|point| point.0 == value)?;
             let (down, up) = (points[..=middle].iter().rev(), points[middle..].iter());
-            (points.len() > 1).then(|| Change {
+            let not_varied = refused.clone().filter(|_| points.len() == 1);
+            (points.len() > 1 || not_varied.is_some()).then(|| Change {
                 axis,
                 here: value,
+                not_varied,
                 measured: [points[0].0, points[points.len() - 1].0],
                 below: turn(taken, down.collect()),
                 above: turn(taken, up.collect()),
@@ -199,14 +215,16 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
         if is_longer(ratio_at(there)?) != Some(true) {
             return None;
         }
-        // The last at which the one taken is ahead; ties from the start have none.
-        let ln = |at: usize| ratio_at(points[at].1).map_or(0.0, |ratio| ratio.value.ln());
-        let ahead = (0..n).rev().find(|&at| ln(at) <= 0.0);
+        // The last at which the one taken is shown ahead; ties from the start have none.
+        let ratio = |at: usize| ratio_at(points[at].1);
+        let ahead = (0..n).rfind(|&at| ratio(at).and_then(is_longer) == Some(false));
         let before = points[ahead.unwrap_or(0)].0;
         // Between two values by the logarithms of value and ratio.
-        let at = ahead.map_or(before, |at| {
+        let ln = |at: usize| ratio(at).map_or(0.0, |ratio| ratio.value.ln());
+        let last = ahead.and_then(|_| (0..n).rfind(|&at| ln(at) <= 0.0));
+        let at = last.map_or(before, |at| {
             let along = ln(at) / (ln(at) - ln(at + 1));
-            before * (points[at + 1].0 / before).powf(along)
+            points[at].0 * (points[at + 1].0 / points[at].0).powf(along)
         });
         let (lower, upper) = (before.min(value), before.max(value));
         Some(Turn {
@@ -221,29 +239,30 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
 impl Changed {
     /// Measures the workload: in the count pass alone if nothing is known.
     ///
-    /// `None` if there is no such workload.
-    fn measured(&self, input: &AdviseInput, beside: &Beside) -> Option<(f64, Part)> {
+    /// # Errors
+    /// There is no such workload.
+    fn measured(&self, input: &AdviseInput, beside: &Beside) -> anyhow::Result<(f64, Part)> {
         let is = |axis| self.axis == Some(axis);
         let (whole, count) = (&input.setting.scene, self.value.round() as usize);
         let part = is(Axis::Items).then(|| part_of(whole, whole.origin, count));
-        let part = part.transpose().ok()?;
+        let part = part.transpose()?;
         let scene = part.as_ref().unwrap_or(whole);
         let mut path = input.setting.path.clone();
         if is(Axis::ShareInView) {
             let lens_scale = self.known.as_ref().and_then(|known| known.lens_scale);
-            path = path.seeing(scene, self.value, lens_scale).ok()?;
+            path = path.seeing(scene, self.value, lens_scale)?;
         }
         let mut motion = None;
         if let Some(source) = input.motion {
-            let own = Motion::load(source, scene).ok()?;
+            let own = Motion::load(source, whole)?;
             let share = is(Axis::ShareMoved).then_some(self.value);
             motion = Some(match (self.axis, own.respecified(share, FRAMES)) {
                 (None, _) | (Some(Axis::ShareInView), None) => own,
-                (_, spec) => Motion::load(&spec?, scene).ok()?,
+                (_, spec) => Motion::load(&spec.context("the motion is recorded")?, scene)?,
             });
         }
         let culling = Culling::default();
-        let workload = Workload::moving(scene, &path, &culling, motion, input.views).ok()?;
+        let workload = Workload::moving(scene, &path, &culling, motion, input.views)?;
         let rebuilt = beside.rebuilt.iter().filter(|_| self.axis.is_none());
         let build = |label: &String| {
             let spec = planned(&input.setting.structures, label);
@@ -270,7 +289,7 @@ impl Changed {
             }),
             _ => moved,
         };
-        Some((reached.unwrap_or(self.value), part))
+        Ok((reached.unwrap_or(self.value), part))
     }
 }
 
@@ -316,6 +335,10 @@ mod tests {
         let late = found(&[(400.0, &here), (100.0, &tie), (25.0, &slower)]).unwrap();
         assert_eq!((late.lower, late.upper), (25.0, 400.0));
         assert!(100.0 < late.at && late.at < 110.0, "{late:?}");
+        // A tie from the start, though ahead: nothing to draw a line from.
+        let near = of(99.0);
+        let tied = found(&[(400.0, &near), (100.0, &slower)]).unwrap();
+        assert_eq!((tied.at, tied.lower, tied.upper), (400.0, 100.0, 400.0));
         // Behind from the start, which was no proof.
         let early = found(&[(400.0, &tie), (100.0, &slower)]).unwrap();
         assert_eq!((early.at, early.lower), (400.0, 100.0));

@@ -16,7 +16,7 @@ use crate::statistics::{Estimate, flat, rate_of, ratio};
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
 pub struct StructureChoice {
-    /// The fastest that answered right; null if none did.
+    /// The fastest that answered right, a scan if one ties with it; null if none did.
     pub name: Option<String>,
     /// Others that the processes do not tell from it.
     pub ties: Vec<String>,
@@ -38,8 +38,9 @@ impl StructureChoice {
             let order = a.rank.is_none().cmp(&b.rank.is_none());
             order.then(or_last(ns(a)).total_cmp(&or_last(ns(b))))
         });
-        let first = fastest(cells).into_iter();
-        let mut first = first.map(|cell| cell.structure.clone());
+        let mut first = fastest(cells);
+        first.sort_by_key(|cell| (is_shared(cell), !cell.is_scan()));
+        let mut first = first.into_iter().map(|cell| cell.structure.clone());
         StructureChoice {
             name: first.next(),
             ties: first.collect(),
@@ -47,9 +48,35 @@ impl StructureChoice {
         }
     }
 
+    /// The cell of the one to take.
+    pub fn taken(&self) -> Option<&ReportCell> {
+        let mut rows = self.rows.iter();
+        rows.find(|row| self.name.as_ref() == Some(&row.structure))
+    }
+
     /// Returns `true` if the one to take is a scan.
     pub fn is_scan(&self) -> bool {
-        matches!(self.rows.first(), Some(row) if row.is_scan() && row.rank.is_some())
+        self.taken().is_some_and(ReportCell::is_scan)
+    }
+
+    /// Returns `true` if a scan and a tree are among those that tie.
+    pub(super) fn is_scan_or_tree(&self) -> bool {
+        let ties = |row: &ReportCell| self.ties.contains(&row.structure);
+        let mut tied = alone(&self.rows).filter(|row| ties(row));
+        tied.any(|row| row.is_scan() != self.is_scan())
+    }
+
+    /// Adds the ties that show where the contenders are timed without the others.
+    pub(super) fn add_ties(&mut self, contenders: &[String], alone: &[ReportCell]) {
+        let Some(taken) = &self.name else { return };
+        let own = |label: &&String| *label == taken || self.ties.contains(label);
+        let ties = |label: &&String| {
+            let ratio = time_over(alone, taken, label);
+            let ratio = ratio.filter(|ratio| ratio.ends().is_some() && !own(label));
+            ratio.is_some_and(|ratio| is_longer(ratio) != Some(false))
+        };
+        let ties: Vec<String> = contenders.iter().filter(ties).cloned().collect();
+        self.ties.extend(ties);
     }
 
     /// The fastest tree or grid and the fastest scan.
@@ -73,14 +100,19 @@ impl StructureChoice {
         let (most, of_kind) = (if moves { 3 } else { 1 }, self.tree_and_scan());
         let own = alone(&self.rows).enumerate();
         let own = own.filter(|(n, row)| *n < most || of_kind.contains(&Some(row)));
-        own.map(|(_, row)| row.structure.clone()).collect()
+        let mut own: Vec<String> = own.map(|(_, row)| row.structure.clone()).collect();
+        own.sort_by_key(|label| Some(label) != self.name.as_ref());
+        own
     }
 }
 
 /// Rows with a rank on one thread.
 fn alone(rows: &[ReportCell]) -> impl Iterator<Item = &ReportCell> {
-    let is_shared = |row: &ReportCell| row.params["threads"].as_u64() > Some(1);
-    (rows.iter()).filter(move |row| row.rank.is_some() && !is_shared(row))
+    (rows.iter()).filter(|row| row.rank.is_some() && !is_shared(row))
+}
+
+fn is_shared(row: &ReportCell) -> bool {
+    row.params["threads"].as_u64() > Some(1)
 }
 
 /// Time of a structure / time of another one, of those that rank.
@@ -380,6 +412,46 @@ mod tests {
         // What misses something is excluded.
         assert_eq!(near(&[dear, ("six-plane", 1.0, 0.0, 1.0)], 10), ["sphere"]);
         assert!(near(&[], 10).is_empty());
+    }
+
+    #[test]
+    fn a_scan_that_ties_with_the_fastest_is_taken() {
+        let cell = |name: &str, kind, threads, ns: f64| {
+            let mut cell = structure(name, kind, threads);
+            let own = (0..10).map(|n| ns * (1.0 + 0.004 * ((n * name.len()) % 7) as f64));
+            cell.times
+                .by_process
+                .insert("query_ns".to_owned(), own.collect());
+            cell.metrics.get_mut("query_ns").unwrap().value = ns;
+            cell
+        };
+        let of = |scan: f64| {
+            let rows = [("wide", "tree", 1, 100.0), ("linear", "scan", 1, scan)];
+            let shared = [
+                ("linear:threads=2", "scan", 2, 100.0),
+                ("bsp", "tree", 1, 150.0),
+            ];
+            rows.into_iter()
+                .chain(shared)
+                .map(|row| cell(row.0, row.1, row.2, row.3))
+                .collect::<Vec<_>>()
+        };
+        let tie = StructureChoice::of(&of(101.0));
+        assert_eq!(tie.name.as_deref(), Some("linear"));
+        assert_eq!(tie.ties, ["wide", "linear:threads=2"]);
+        assert!(tie.is_scan() && tie.is_scan_or_tree());
+        assert_eq!(tie.contenders(false), ["linear", "wide"]);
+        // A tie with the others left out is one too; a firm answer stays.
+        let mut ahead = StructureChoice::of(&of(80.0));
+        assert_eq!(
+            (ahead.name.as_deref(), ahead.ties.len()),
+            (Some("linear"), 0)
+        );
+        let contenders = ahead.contenders(false);
+        ahead.add_ties(&contenders, &of(80.0));
+        assert!(ahead.ties.is_empty() && !ahead.is_scan_or_tree());
+        ahead.add_ties(&contenders, &of(100.0));
+        assert!(ahead.ties == ["wide"] && ahead.is_scan_or_tree());
     }
 
     #[test]

@@ -136,10 +136,12 @@ impl Prepared {
         let tests = &self.entered.tests;
         let test = TestChoice::of(tree, input.draw_ns, tests, answered, &times);
         let groups = beside.groups(self.counted, processes);
-        // With rebuilds the first one is the workload itself.
-        let here = groups.first().filter(|_| beside.has_rebuilds());
-        let here = here.map_or(&self.structure.rows, |group| &group.cells);
-        let changes = beside.changes(here, &groups);
+        let (mut structure, duel) = (self.structure, beside.here(&groups));
+        structure.add_ties(&beside.contenders, duel.unwrap_or_default());
+        let changes = beside.changes(duel.unwrap_or(&structure.rows), &groups);
+        let rebuilds = duel.filter(|_| beside.rebuilt.is_some());
+        let policies = rebuilds.unwrap_or(&structure.rows);
+        let motion = (self.motion).map(|motion| motion.chosen(&structure, policies));
         // The times of the stages come behind those of the tasks.
         let tasks = self.plan.expected.len();
         let of_stages = processes.iter().map(|process| ProcessTimes {
@@ -148,7 +150,6 @@ impl Prepared {
         });
         let of_stages: Vec<ProcessTimes> = of_stages.collect();
         let funnel = self.funnel.map(|prepared| prepared.conclude(&of_stages));
-        let motion = (self.motion).map(|motion| motion.chosen(&self.structure, here));
         let mut advice = Advice {
             draw_ns: input.draw_ns,
             processes: processes.len(),
@@ -156,7 +157,7 @@ impl Prepared {
             omissions: Vec::new(),
             test,
             motion,
-            structure: self.structure,
+            structure,
             changes,
             funnel,
         };

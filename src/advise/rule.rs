@@ -153,8 +153,7 @@ impl Rule {
         let check = omission.check.as_ref();
         let by_clock = check.filter(|_| self.by == By::Time);
         let by_clock = by_clock.and_then(|check| is_longer(check.ratio?));
-        let misses_more = |c: &Check| c.left_out.false_negative_ppm > c.kept.false_negative_ppm;
-        let is_lost = check.is_some_and(misses_more) || omission.is_wrong();
+        let is_lost = omission.loses_items();
         let compared = finding.compared;
         let order = compared.and_then(|[own, most]| own.partial_cmp(&most));
         if let Some(order) = order {
@@ -195,9 +194,21 @@ pub struct Omission {
 }
 
 impl Omission {
-    /// Returns `true` if the work is needed; `None` where the rule does not apply.
-    pub fn is_needed(&self) -> Option<bool> {
-        (self.decision != Decision::NotApplicable).then_some(self.decision == Decision::Keep)
+    /// Returns yes, no, or either for a tie; empty where the rule does not apply.
+    pub fn answer(&self) -> &'static str {
+        let by_cost = self.rule.by != By::Error && !self.loses_items();
+        match self.decision {
+            Decision::NotApplicable => "",
+            _ if self.is_tie && by_cost => "either",
+            Decision::Keep => "yes",
+            Decision::LeaveOut => "no",
+        }
+    }
+
+    /// Returns `true` if items are missed without the work, or the sides differ.
+    fn loses_items(&self) -> bool {
+        let misses_more = |c: &Check| c.left_out.false_negative_ppm > c.kept.false_negative_ppm;
+        self.check.as_ref().is_some_and(misses_more) || self.is_wrong()
     }
 
     /// Returns `true` if two sides that must answer the same did not.

@@ -11,8 +11,8 @@ use super::change::Axis;
 use super::choice::{ns, over, policy_of};
 use super::planes;
 use super::rule::{Draft, Finding, Rule};
-use super::trials::By::{Rule as Statistic, Time};
-use super::trials::{BASE, Check, Sides, Trials, is_longer};
+use super::trials::By::{Error, Rule as Statistic, Time};
+use super::trials::{BASE, Check, Sides, Trials};
 use crate::drift::walk;
 use crate::funnel::StageKind::{self, Fragment, Occlusion, Region, Triangle};
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE};
@@ -24,13 +24,13 @@ use crate::visibility::SampleGrid;
 /// All rules: name, work to leave out; statistic; decision.
 pub(super) const RULES: &[Rule] = rows! {
     Rule { name, left_out, statistic_name, by, enter }
-    "needless-planes", "every plane",
+    "needless-planes", "all six planes",
         "share of all planes that the n-vertex of the scene's bounds is not inside of",
         Time, planes::needless_planes;
-    "plane-masks", "inherited planes", "share of the plane tests that masks do not save",
+    "plane-masks", "plane masks", "share of the plane tests that masks save",
         Time, planes::plane_masks;
     "no-index", "index", "items", Time, no_index;
-    "six-planes", "axes beyond planes", "cost of drawing what six planes let through, ns a query",
+    "six-planes", "exact test (SAT)", "cost of drawing what six planes let through, ns a query",
         Statistic, planes::six_planes;
     "regions", "portals",
         "share of the items left by the other stages that lie in no region that is seen",
@@ -45,13 +45,13 @@ pub(super) const RULES: &[Rule] = rows! {
         Statistic, |_| reads(Fragment);
     "third-dimension", "third dimension", "height of the scene", Time, third_dimension;
     "rebasing", "rebasing", "margin for rounding in world coordinates / depth of the view",
-        Statistic, planes::rebasing;
+        Error, planes::rebasing;
     "rebuild", "rebuilds", "time of a frame without rebuilds, ns",
         Statistic, |_| rebuild();
     "f64-kernel", "double precision", "margin for rounding to f32 / depth of the view",
-        Statistic, planes::f64_kernel;
-    "frame-correction", "basis correction", "error of the axes after all steps of the path",
-        Statistic, frame_correction;
+        Error, planes::f64_kernel;
+    "frame-correction", "orthonormalization", "error of the axes after all steps of the path",
+        Error, frame_correction;
 };
 
 /// The index itself: below some number of items a scan is as fast.
@@ -72,8 +72,7 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let [tree, fastest] = taken.tree_and_scan();
         let both = tree.zip(fastest);
         let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
-        let ratio = both.and_then(|(tree, scan)| over(tree, scan));
-        let is_tie = ratio.map(|ratio| is_longer(ratio).is_none());
+        let is_tie = costs.map(|_| taken.is_scan_or_tree());
         let alone = check.filter(|_| costs.is_none());
         let change = advice.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
@@ -81,7 +80,8 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let least = below.map(|turn| turn.upper);
         let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
         let scan_wins = alone.map_or(taken.is_scan(), wins);
-        let below = below.filter(|turn| turn.structure == scan && alone.is_none());
+        // From the whole on where both tie there.
+        let below = below.filter(|turn| turn.structure == scan && turn.at < all);
         let crossing = match below {
             _ if scan_wins => all,
             Some(turn) => turn.at,
@@ -90,8 +90,8 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let least = least.or(change.map(|change| change.measured[0]));
         let reason = match crossing {
             _ if costs.is_none() => format!("by all items alone{place}"),
-            // A scan that ties with a tree wins nowhere.
-            _ if taken.is_scan() && is_tie == Some(true) => "a scan and a tree tie".to_owned(),
+            _ if is_tie == Some(true) => "a scan and a tree tie".to_owned(),
+            _ if scan_wins => "a scan wins".to_owned(),
             0.0 => format!(
                 "no scan wins from {} items on",
                 count(least.unwrap_or(all) as usize)

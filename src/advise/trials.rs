@@ -202,8 +202,10 @@ pub enum Decision {
 pub(super) enum By {
     /// Both sides answer the same: the clock, and the rule where that is a tie.
     Time,
-    /// The sides differ in more than time: the rule.
+    /// The sides differ in more than time: the rule, whose statistic is a cost.
     Rule,
+    /// The rule, whose statistic is an error; costs that tie do not matter.
+    Error,
 }
 
 /// Times and answers with the work of a rule (kept) and without it (left out).
@@ -300,6 +302,23 @@ mod tests {
                 assert!(omission.decision == wanted && !omission.is_wrong());
             }
         }
+    }
+
+    #[test]
+    fn a_tie_in_costs_leaves_the_choice_but_not_where_an_error_decides() {
+        let of = |by, statistic, missed: [f64; 2]| {
+            let mut check = check(1.0, missed);
+            check.ratio = Some(Estimate::within(1.0, [0.9, 1.1]));
+            settled(by, statistic, check).answer()
+        };
+        for by in [By::Time, By::Rule] {
+            assert_eq!([0.5, 2.0].map(|size| of(by, size, [0.0; 2])), ["either"; 2]);
+            assert_eq!(of(by, 0.5, [1.0, 2.0]), "yes");
+        }
+        let by_error = [0.5, 2.0].map(|size| of(By::Error, size, [0.0; 2]));
+        assert_eq!(by_error, ["no", "yes"]);
+        let clear = settled(By::Rule, 2.0, check(1.5, [0.0; 2]));
+        assert_eq!(clear.answer(), "yes");
     }
 
     #[test]

@@ -159,17 +159,21 @@ fn taken(advice: &Advice) -> String {
     let Some(name) = &choice.name else {
         return "No structure answered right".to_owned();
     };
-    let mut others = choice.rows[1..].iter().filter(|row| row.rank.is_some());
-    let next = others.find(|row| !choice.ties.contains(&row.structure));
-    let lead = next.and_then(|next| {
-        let times = times(ns(next)? / ns(&choice.rows[0])?);
-        Some(format!(" ({times} {}, the next)", next.structure))
+    let mut others = choice.rows.iter().filter(|row| row.rank.is_some());
+    let next = others.find(|row| row.structure != *name && !choice.ties.contains(&row.structure));
+    let lead = next.zip(choice.taken()).and_then(|(next, own)| {
+        let lead = Some(ns(next)? / ns(own)?).filter(|lead| *lead >= 1.0)?;
+        let lead = format!("{} {}", times(lead), next.structure);
+        Some(match tie(&choice.ties) {
+            tie if tie.is_empty() => format!(" ({lead}, the next)"),
+            tie => format!(" ({tie}; {lead})"),
+        })
     });
     let test = some(advice.test.name, |test| {
         format!(", test {test}{}", ties(&advice.test.ties))
     });
-    let lead = lead.unwrap_or_default();
-    format!("Take structure {name}{lead}{}{test}.", ties(&choice.ties))
+    let lead = lead.unwrap_or_else(|| ties(&choice.ties));
+    format!("Take structure {name}{lead}{test}.")
 }
 
 /// Policy to update by, with the times of a frame.
@@ -198,7 +202,14 @@ fn in_motion(advice: &Advice) -> Option<String> {
 
 /// From where on other structures are faster, a line per axis.
 fn changes(advice: &Advice) -> Vec<String> {
-    let told = advice.changes.iter().map(|change| {
+    let all = &advice.changes;
+    let turns = (all.iter()).any(|own| own.below.is_some() || own.above.is_some());
+    let head = match all.iter().all(|own| own.not_varied.is_some()) {
+        _ if turns => "Another structure is faster",
+        false => "No other structure is shown to be faster",
+        true => "Another structure may be faster",
+    };
+    let told = all.iter().map(|change| {
         let (what, show): (_, fn(f64) -> String) = match change.axis {
             Axis::Items => ("number of items", |items| {
                 text::count(items.round() as usize)
@@ -206,22 +217,33 @@ fn changes(advice: &Advice) -> Vec<String> {
             Axis::ShareInView => ("share in view", text::short_percent),
             Axis::ShareMoved => ("share moved", text::short_percent),
         };
-        let turns = [("below", &change.below), ("above", &change.above)];
-        let turns = turns.into_iter().filter_map(|(side, turn)| {
+        if let Some(why) = &change.not_varied {
+            return format!("  {what}: not varied: {why}");
+        }
+        let sides = [("below", &change.below), ("above", &change.above)];
+        let found = sides.into_iter().filter_map(|(side, turn)| {
             let turn = turn.as_ref()?;
             let [at, lower, upper] = [turn.at, turn.lower, turn.upper].map(show);
-            let structure = &turn.structure;
-            Some(format!("{side} {at} ({lower} to {upper}) {structure}"))
+            let (structure, other) = (&turn.structure, [&upper, &lower]);
+            // No line through a tie at the workload itself.
+            Some(match turn.at == change.here {
+                true => format!(
+                    "at {} {structure}, at {at} a tie",
+                    other[usize::from(side == "below")]
+                ),
+                false => format!("{side} {at} ({lower} to {upper}) {structure}"),
+            })
         });
         let [low, high] = change.measured.map(show);
-        let turns = text::joined(turns);
-        match turns.is_empty() {
-            true => format!("  {what}: not shown within {low} to {high}, which were measured"),
-            false => format!("  {what}: {turns}; measured from {low} to {high}"),
-        }
+        let found = match text::joined(found) {
+            none if none.is_empty() && turns => "none; ".to_owned(),
+            none if none.is_empty() => none,
+            found => found + "; ",
+        };
+        format!("  {what}: {found}measured from {low} to {high}")
     });
-    let head = ["", "Another structure is faster"].map(str::to_owned);
-    let head = advice.changes.first().map(|_| head);
+    let head = ["", head].map(str::to_owned);
+    let head = all.first().map(|_| head);
     head.into_iter().flatten().chain(told).collect()
 }
 
@@ -256,19 +278,20 @@ fn evidence(advice: &Advice) -> Vec<Block> {
 }
 
 fn ties(names: &[impl AsRef<str>]) -> String {
-    let tied = |_| format!(" (a tie with {})", text::joined(names));
-    some(names.first(), tied)
+    some(names.first(), |_| format!(" ({})", tie(names)))
+}
+
+fn tie(names: &[impl AsRef<str>]) -> String {
+    some(names.first(), |_| {
+        format!("a tie with {}", text::joined(names))
+    })
 }
 
 /// Columns of features; those from the seventh on are evidence.
 fn features<'o>() -> [Column<&'o Omission>; 13] {
     [
         ("feature", |rule| rule.rule.left_out.to_owned()),
-        ("needed", |rule| {
-            some(rule.is_needed(), |is| {
-                ["no", "yes"][usize::from(is)].to_owned()
-            })
-        }),
+        ("use", |rule| rule.answer().to_owned()),
         (">with", |rule| some(rule.cost_ns, |[with, _]| cost(with))),
         (">without", |rule| {
             some(rule.cost_ns, |[_, without]| cost(without))
@@ -280,7 +303,7 @@ fn features<'o>() -> [Column<&'o Omission>; 13] {
         }),
         ("", |rule| rule.reason.clone()),
         (">statistic", |rule| some(rule.statistic, significant)),
-        (">needed above", |rule| some(rule.threshold, significant)),
+        (">used above", |rule| some(rule.threshold, significant)),
         ("measured on", |rule| {
             some(rule.check.as_ref(), |check| check.on.clone())
         }),
@@ -314,13 +337,14 @@ fn cost(ns: f64) -> String {
     some(Some(ns).filter(|ns| ns.is_finite()), text::time)
 }
 
-/// Features that are needed, those that are not, and those that do not apply.
+/// Features to use, those that tie, those to skip, and those that do not apply.
 fn rule_table(rules: &[Omission], all_columns: bool) -> Table {
     let mut rules = rules.to_vec();
-    rules.sort_by_key(|rule| rule.is_needed().map_or(2, |is| u8::from(!is)));
+    let order = ["yes", "either", "no", ""];
+    rules.sort_by_key(|rule| order.iter().position(|answer| *answer == rule.answer()));
     // A reason that several stages share is given once.
     for row in (1..rules.len()).rev() {
-        if rules[row].is_needed().is_none() && rules[row].reason == rules[row - 1].reason {
+        if rules[row].answer().is_empty() && rules[row].reason == rules[row - 1].reason {
             "as above".clone_into(&mut rules[row].reason);
         }
     }

@@ -306,6 +306,7 @@ pub struct PrecisionArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(after_help = include_str!("assets/help/advise.txt"))]
 #[command(mut_arg("structure", |arg| arg.help("Structures to choose from, e.g. linear,bvh:leaf=4")))]
 pub struct AdviseArgs {
     #[command(flatten)]

@@ -109,7 +109,7 @@ fn json_has_the_documented_fields() {
     one(&moving["motion"], "policy policy_ties policies ruled_out");
     for advice in [advice, moving] {
         for change in array(advice, "changes") {
-            one(change, "axis here measured below above");
+            one(change, "axis here not_varied measured below above");
             for turn in ["below", "above"].map(|side| &change[side]) {
                 if !turn.is_null() {
                     one(turn, "structure at lower upper");
@@ -419,10 +419,17 @@ fn the_advice_fits_eighty_columns_and_the_evidence_is_asked_for() {
     // A row is a line, however wide.
     let is_cut = |line: &str| line.starts_with(['[', '/']) || line.starts_with("extras");
     assert!(!all.lines().any(is_cut), "{all}");
-    for feature in ["inherited planes", "index", "portals", "basis correction"] {
+    for feature in ["plane masks", "index", "portals", "orthonormalization"] {
         assert!(all.contains(&format!("\n{feature} ")), "{feature}: {all}");
     }
-    // One vocabulary: needed or not, with and without.
+    // The help explains every name and every answer.
+    let help = works(Path::new("."), "advise --help");
+    for omission in array(small(), "omissions") {
+        let name = omission["left_out"].as_str().expect("a name");
+        assert!(help.contains(&format!("\n  {name} ")), "{name}: {help}");
+    }
+    assert!(help.contains("either where the costs"), "{help}");
+    // One vocabulary: use or not, with and without.
     for word in ["leave out", "left out", "keep", "kept"] {
         for told in [&told, &all] {
             assert!(!told.contains(word), "{word}: {told}");

@@ -104,7 +104,7 @@ fn policies_are_weighed_without_being_named() {
     );
     for part in [
         "Update policies, side by side:",
-        "feature             needed",
+        "feature             use",
         "In motion: ",
         "A frame takes ",
         "rebuild ",
@@ -112,6 +112,31 @@ fn policies_are_weighed_without_being_named() {
         assert!(told.contains(part), "{part}: {told}");
     }
     assert!(!told.contains("Another structure"), "{told}");
+}
+
+#[test]
+fn what_is_recorded_is_not_varied_and_that_is_told() {
+    let folder = with_good_files(&[(
+        "m.csv",
+        b"frame,id,min_x,min_y,min_z,max_x,max_y,max_z\n1,0,0,0,0,1,1,1\n",
+    )]);
+    let line =
+        "advise --scene scene.csv --path orbit:frames=2 --structure linear,wide --processes 1";
+    let told = works(folder.path(), &format!("{line} --motion m.csv"));
+    for axis in ["number of items", "share moved"] {
+        let wanted = format!("\n  {axis}: not varied: the motion is recorded\n");
+        assert!(told.contains(&wanted), "{axis}: {told}");
+    }
+    let advice = advice(
+        folder.path(),
+        &format!("{line} --motion m.csv").replace(" --processes 1", ""),
+    );
+    let moved = &array(&advice, "changes")[2];
+    assert_eq!(moved["not_varied"], "the motion is recorded");
+    assert_eq!(
+        moved["measured"],
+        json(&format!("[{0},{0}]", moved["here"]))
+    );
 }
 
 #[test]
