@@ -181,7 +181,7 @@ pub struct ReportArgs {
     /// Write one page about all runs: time per query of each structure over the runs
     #[arg(long, value_name = "FILE", conflicts_with_all = ["markdown", "svg", "html", "bencher"])]
     pub history: Option<PathBuf>,
-    /// Write Markdown to a file [default: to standard output; the tables of `run` on a terminal]
+    /// Write Markdown to a file [default: to standard output]
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
     /// Write charts into a folder: speed-ups per scene and path, time against items

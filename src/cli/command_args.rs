@@ -100,7 +100,7 @@ pub struct FunnelArgs {
     /// Also write each table as a CSV file (stages.csv, gains.csv, ..) to a folder
     #[arg(long, value_name = "FOLDER")]
     pub csv: Option<PathBuf>,
-    /// Draw the view that sees most from above, items coloured by the stage that removed them
+    /// Draw the view that sees most from above, items by the stage that removed them
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     #[arg(long, value_enum, default_value = "table")]

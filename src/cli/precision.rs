@@ -339,8 +339,9 @@ fn errors_table(points: &[Point]) -> Table {
     Table::with(points, columns)
 }
 
-/// A row for those of one structure, test, arithmetic and errors: the fastest that is safe
-/// by its margin, or the fastest; with `all` a row for each.
+/// A row for those of one structure, test, arithmetic and errors.
+///
+/// It shows the fastest that is safe by its margin, or the fastest; with `all` a row each.
 fn front_table(p: &Precision, all: bool) -> Table {
     let key = |i: usize| {
         let point = &p.points[i];

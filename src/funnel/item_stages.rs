@@ -218,7 +218,7 @@ pub struct PlanView {
 }
 
 impl PlanView {
-    /// The first of the views that see most, behind the stages of whole items of a chain.
+    /// The first of the views that see most, behind the item stages of a chain.
     pub fn of(world: &World, stages: &ItemStages, chain: &Chain, truth: &Truth) -> PlanView {
         let both = world.views.iter().zip(truth).enumerate();
         let most = both.rev().max_by_key(|(_, (_, visible))| visible.len());

@@ -69,6 +69,7 @@ pub(crate) use erased::QueryMany;
 pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
 pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
+#[cfg(feature = "cli")]
 pub(crate) use items::Record;
 pub use items::{IdSet, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};

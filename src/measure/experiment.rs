@@ -288,7 +288,7 @@ pub fn measure_scene(
 /// Cameras of a path by its name, and by the scale of far that is known of it.
 pub type PathOf<'a> = &'a dyn Fn(&str, Option<f64>) -> Result<CameraPath, InputError>;
 
-/// Measures one process's share of a scene that is there, as [`measure_scene`] does.
+/// Measures one process's share of a loaded scene, as [`measure_scene`] does.
 ///
 /// # Errors
 /// A path that cannot be read or made, a camera without a view.

@@ -81,7 +81,9 @@ impl Experiment {
         }
     }
 
-    /// An experiment on a scene and a path that are in memory; otherwise as [`Experiment::new`].
+    /// An experiment on a scene and a path in memory.
+    ///
+    /// Otherwise as [`Experiment::new`].
     pub fn of(scene: Scene, path: CameraPath) -> Experiment {
         let experiment = Experiment::new(&scene.name).path(&path.name);
         Experiment {
