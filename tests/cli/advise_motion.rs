@@ -116,21 +116,17 @@ fn policies_are_weighed_without_being_named() {
 
 #[test]
 fn what_is_recorded_is_not_varied_and_that_is_told() {
-    let folder = with_good_files(&[(
-        "m.csv",
-        b"frame,id,min_x,min_y,min_z,max_x,max_y,max_z\n1,0,0,0,0,1,1,1\n",
-    )]);
+    let motion =
+        b"time_s,id,min_x,min_y,min_z,max_x,max_y,max_z\n0,0,0,0,0,1,1,1\n1,0,1,0,0,2,1,1\n";
+    let folder = folder(&[("m.csv", motion)]);
     let line =
-        "advise --scene scene.csv --path orbit:frames=2 --structure linear,wide --processes 1";
-    let told = works(folder.path(), &format!("{line} --motion m.csv"));
+        "advise --scene uniform:n=200 --path orbit:frames=2 --structure linear,wide --motion m.csv";
+    let told = works(folder.path(), &format!("{line} --processes 1"));
     for axis in ["number of items", "share moved"] {
         let wanted = format!("\n  {axis}: not varied: the motion is recorded\n");
         assert!(told.contains(&wanted), "{axis}: {told}");
     }
-    let advice = advice(
-        folder.path(),
-        &format!("{line} --motion m.csv").replace(" --processes 1", ""),
-    );
+    let advice = advice(folder.path(), line);
     let moved = &array(&advice, "changes")[2];
     assert_eq!(moved["not_varied"], "the motion is recorded");
     assert_eq!(
