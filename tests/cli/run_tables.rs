@@ -79,7 +79,10 @@ fn a_run_ends_with_its_conclusion_in_eighty_columns() {
     };
     let next = format!("{}, the next best", ratio(&cells[winners]));
     assert!(told.contains(&next), "no '{next}': {told}");
-    assert_eq!(told.contains("(a tie)"), winners > 1, "{told}");
+    // Noise may tie the fastest with what is slower than the next best.
+    let ahead = cells[..winners].iter();
+    let ahead = ahead.filter(|cell| cell.0 <= cells[winners].0).count();
+    assert_eq!(told.contains("(a tie)"), ahead > 1, "{told}");
     for wanted in [
         "All structures returned the sets of the reference scan in all 16 views, of which",
         "A/A check:",
