@@ -4,7 +4,7 @@ use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{
-    LoadOptions, Scene, read_boxes_csv, read_gltf, read_obj, read_sought_boxes_csv, write_boxes_csv,
+    LoadOptions, Scene, read_boxes_csv, read_bytes, read_obj, read_sought_boxes_csv, write_boxes_csv,
 };
 use cullbench::stress::{Vector, read_vectors, replay};
 
@@ -13,7 +13,7 @@ use crate::read;
 /// Reads glTF whose buffers are within it.
 pub fn gltf(bytes: &[u8]) {
     let options = LoadOptions::default();
-    if let Some(scene) = read(read_gltf(bytes, "fuzz.gltf", "fuzz", &options)) {
+    if let Some(scene) = read(read_bytes(bytes, ["fuzz.gltf", "fuzz"], None, &options)) {
         let surfaces = scene.surfaces.iter();
         assert!(
             surfaces

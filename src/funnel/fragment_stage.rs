@@ -118,10 +118,8 @@ impl<'w> FragmentStage<'w> {
         match &self.left {
             Left::Boxes(views, image) => {
                 let new = || {
-                    (
-                        Canvas::about(rays, grid, DVec3::ZERO),
-                        Drawn::new(grid.samples()),
-                    )
+                    let canvas = Canvas::about(rays, grid, DVec3::ZERO);
+                    (canvas, Drawn::new(grid.samples()))
                 };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);

@@ -72,8 +72,6 @@ struct Rows {
 impl Rows {
     /// Tells of labels that may have been meant as bounds.
     fn note_near_names(&self, file: &str) {
-        let is_mark = |c: char| !c.is_alphanumeric();
-        let letters = |name: &str| name.to_lowercase().replace(is_mark, "");
         for name in self.labels.iter().map(|label| &label.column) {
             if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
                 let name = shortened(name, 60);
@@ -92,14 +90,16 @@ impl Rows {
     }
 }
 
+/// A name in lower case without marks and blanks.
+fn letters(name: &str) -> String {
+    name.to_lowercase()
+        .replace(|c: char| !c.is_alphanumeric(), "")
+}
+
 /// Reads all rows; bad is also a bound beyond `limit`.
 fn read_rows(table: &mut TableReader, limit: f64) -> Result<Rows> {
-    let is_centre = |name: &String| {
-        let letters = name
-            .to_lowercase()
-            .replace(|c: char| !c.is_alphanumeric(), "");
-        ["centerx", "centrex", "centroidx"].contains(&&letters[..])
-    };
+    let centres = ["centerx", "centrex", "centroidx"];
+    let is_centre = |name: &String| centres.contains(&&letters(name)[..]);
     if table.column(BOUNDS[0]).is_none() && table.header.iter().any(is_centre) {
         let half = "min = centre - half the size, max = centre + half the size";
         let expected = format!("a header with {}: {half}", BOUNDS.join(","));

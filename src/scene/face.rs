@@ -31,8 +31,7 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
         return Ok(());
     };
     if face.len() > MOST_CONCAVE {
-        let corners = counted(face.len(), "corner");
-        return Err(format!("a concave face of {corners}"));
+        return Err("a concave face of ".to_owned() + &counted(face.len(), "corner"));
     }
     let mut ears: Vec<u32> = Vec::new();
     let flat = flat.iter().map(DVec2::to_array);

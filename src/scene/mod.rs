@@ -50,7 +50,7 @@ pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
 pub(crate) use generate::COUNT;
 pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
-pub use gltf::{CameraAnimation, read_gltf};
+pub use gltf::CameraAnimation;
 pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
 #[cfg(feature = "cli")]

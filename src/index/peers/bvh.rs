@@ -76,11 +76,16 @@ const SMALLEST: f32 = 1e-4;
 /// It takes as long as a build from three eighths moved on, below from three quarters on.
 const LARGE: usize = 10_000;
 
-/// The crate's tree over shapes scaled to a reach of 1,000, its nodes then fitted.
+/// The crate's tree; true if over shapes scaled to a reach of 1,000, its nodes then fitted.
 ///
 /// If areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
-fn scaled_tree(shapes: &mut [Shape], reach: f32) -> Bvh<f32, 3> {
+fn tree(shapes: &mut [Shape]) -> (Bvh<f32, 3>, bool) {
+    let scene = Aabb::union_of(shapes.iter().map(|shape| &shape.item.bounds));
+    let reach = scene.reach().max_element();
+    if (SMALLEST..=LARGEST).contains(&reach) {
+        return (Bvh::build(shapes), false);
+    }
     let scale = (1e3 / reach).min(1e38);
     let smaller = |shape: &Shape| {
         let (mut small, b) = (*shape, shape.item.bounds);
@@ -101,7 +106,7 @@ fn scaled_tree(shapes: &mut [Shape], reach: f32) -> Bvh<f32, 3> {
             *tree.nodes[at].child_r_aabb_mut() = right;
         }
     }
-    tree
+    (tree, true)
 }
 
 /// The crate's tree over a list of shapes, traversed by the crate's own recursion.
@@ -123,15 +128,9 @@ impl BoxTested for PeerBvh {
     type Params = NoParams;
 
     fn of(items: Vec<Record>, _: &NoParams) -> Result<Self, BuildError> {
-        let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
         let shapes = items.into_iter().map(|item| Shape { item, node: 0 });
         let mut shapes: Vec<Shape> = shapes.collect();
-        let reach = scene.reach().max_element();
-        let scaled = !(SMALLEST..=LARGEST).contains(&reach);
-        let tree = match scaled {
-            true => scaled_tree(&mut shapes, reach),
-            false => Bvh::build(&mut shapes),
-        };
+        let (tree, scaled) = tree(&mut shapes);
         Ok(PeerBvh {
             tree,
             shapes,
@@ -153,33 +152,28 @@ impl BoxTested for PeerBvh {
         moved.dedup();
         let (mut removed, mut added, mut overflows) = (Vec::new(), Vec::new(), false);
         for id in moved {
-            let mut bounds = items[id as usize];
             let at = self.positions.of(id).unwrap_or(self.shapes.len());
-            match self.shapes.get_mut(at) {
-                Some(shape) => std::mem::swap(&mut shape.item.bounds, &mut bounds),
-                None => {
-                    self.positions.set(id, at as u32);
-                    let item = Record { bounds, id };
-                    self.shapes.push(Shape { item, node: 0 });
-                    bounds = Aabb::EMPTY;
-                }
+            if at == self.shapes.len() {
+                self.positions.set(id, at as u32);
+                let bounds = Aabb::EMPTY;
+                let item = Record { bounds, id };
+                self.shapes.push(Shape { item, node: 0 });
             }
-            removed.extend((!bounds.is_empty()).then_some(at));
-            let bounds = self.shapes[at].item.bounds;
-            added.extend((!bounds.is_empty()).then_some(at));
-            overflows |= !bounds.is_empty() && bounds.reach().max_element() > LARGEST;
+            let new = items[id as usize];
+            let old = std::mem::replace(&mut self.shapes[at].item.bounds, new);
+            removed.extend((!old.is_empty()).then_some(at));
+            added.extend((!new.is_empty()).then_some(at));
+            overflows |= !new.is_empty() && new.reach().max_element() > LARGEST;
         }
         let count = self.shapes.len();
         let eighths = if count > LARGE { 3 } else { 6 };
         let changed = removed.len().max(added.len());
         if changed * 8 >= count * eighths || self.scaled || overflows {
-            let held = self.shapes.iter().map(|shape| shape.item);
-            let held: Vec<Record> = held.filter(|item| !item.bounds.is_empty()).collect();
-            let built = Self::of(held, &NoParams {}).ok()?;
-            let old = std::mem::replace(self, built);
-            if self.shapes.len() == count {
-                self.positions = old.positions;
+            self.shapes.retain(|shape| !shape.item.bounds.is_empty());
+            if self.shapes.len() < count {
+                self.positions = Positions::default();
             }
+            (self.tree, self.scaled) = tree(&mut self.shapes);
             return Some(());
         }
         for at in removed {

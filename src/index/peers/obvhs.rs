@@ -203,10 +203,9 @@ impl BoxTested for PeerObvhs {
             &bvh.primitives_to_nodes,
             &bvh.parents,
         ];
-        let leaves = match self.boxes.is_empty() {
-            true => self.ids.len() * size_of::<Bvh2Node>(),
-            false => 0,
-        };
+        // A leaf of one item has its bounds.
+        let items_in_nodes = usize::from(self.boxes.is_empty()) * self.ids.len();
+        let leaves = items_in_nodes * size_of::<Bvh2Node>();
         MemoryUsage {
             node_bytes: bvh.nodes.capacity() * size_of::<Bvh2Node>() - leaves
                 + places.iter().map(|list| list.capacity() * 4).sum::<usize>(),

@@ -53,6 +53,9 @@ struct Motion {
     tracks: [Option<Arc<Track>>; 3],
 }
 
+/// Animation, number in it, part that it moves, and the channel itself.
+type Moving<'f> = (usize, usize, usize, &'f Channel);
+
 /// Tracks by input, output, width and interpolation; many channels may name one.
 type Tracks = HashMap<[usize; 4], Arc<Track>>;
 
@@ -159,7 +162,7 @@ impl File<'_> {
 
     /// The first camera that an animation moves, by its first animation.
     pub fn camera_animation(&self, order: &Order) -> Result<Option<CameraAnimation>> {
-        let mut channels: HashMap<usize, Vec<(usize, usize, usize, &Channel)>> = HashMap::new();
+        let mut channels: HashMap<usize, Vec<Moving>> = HashMap::new();
         for (clip, animation) in self.root.animations.iter().enumerate() {
             for (number, channel) in animation.channels.iter().enumerate() {
                 if let Some(part) = part(channel) {
@@ -184,12 +187,11 @@ impl File<'_> {
         for index in nodes {
             let mut tracks = [None, None, None];
             let own = channels.get(&index).into_iter().flatten();
-            for &(clip, number, part, channel) in own.filter(|own| clips.first() == Some(&own.0)) {
-                let place = format!("animations[{clip}].channels[{number}]");
-                let track = self.track(clip, channel, part, &place, &mut known)?;
+            for own in own.filter(|own| clips.first() == Some(&own.0)) {
+                let track = self.track(own, &mut known)?;
                 seconds[0] = seconds[0].min(track.times[0]);
                 seconds[1] = seconds[1].max(track.times[track.times.len() - 1]);
-                tracks[part] = Some(track);
+                tracks[own.2] = Some(track);
             }
             chain.push(Motion {
                 still: self.local(index)?,
@@ -206,14 +208,9 @@ impl File<'_> {
         }))
     }
 
-    fn track(
-        &self,
-        clip: usize,
-        channel: &Channel,
-        part: usize,
-        place: &str,
-        known: &mut Tracks,
-    ) -> Result<Arc<Track>> {
+    fn track(&self, own: &Moving, known: &mut Tracks) -> Result<Arc<Track>> {
+        let &(clip, number, part, channel) = own;
+        let place = &format!("animations[{clip}].channels[{number}]");
         let samplers = &self.root.animations[clip].samplers;
         let sampler = self.get(samplers, channel.sampler, place)?;
         let width = if part == 1 { 4 } else { 3 };

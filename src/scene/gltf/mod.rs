@@ -42,14 +42,6 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
     bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{")
 }
 
-/// Reads a scene; `file` is the path that other files are named relative to.
-///
-/// # Errors
-/// A file that is no glTF, or has what is not read; buffers that cannot be read or are too short.
-pub fn read_gltf(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
-    read_beside(bytes, [file, name], options, &|uri| beside(file, uri))
-}
-
 /// Reads a scene; `beside` reads the files that it names.
 ///
 /// # Errors

@@ -49,6 +49,10 @@ fn file() -> Value {
     })
 }
 
+fn read_gltf(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
+    read_beside(bytes, [file, name], options, &|uri| beside(file, uri))
+}
+
 pub(super) fn read(file: &Value) -> Result<Scene> {
     let text = file.to_string();
     assert!(is_gltf(text.as_bytes()));
