@@ -136,17 +136,14 @@ impl Beside {
                 known: None,
             };
             // No such workload: a share that the cameras do not reach, a recorded motion.
-            match changed.measured(input, &beside) {
-                Ok((reached, part)) => {
+            match (changed.measured(input, &beside), axis) {
+                (Ok((reached, part)), _) => {
                     (changed.reached, changed.known) = (reached, part.known.clone());
                     beside.changed.push(changed);
                     parts.push(part);
                 }
-                Err(error) => {
-                    let own = axis.map(|axis| &mut beside.refused[axis as usize]);
-                    own.into_iter()
-                        .for_each(|why| *why = Some(error.to_string()));
-                }
+                (Err(why), Some(axis)) => beside.refused[axis as usize] = Some(why.to_string()),
+                (Err(_), None) => {}
             }
         }
         (beside, parts)

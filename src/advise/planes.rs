@@ -36,11 +36,8 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
         fewer.push(CameraView::Volume(left));
     }
     let share = needed as f64 / all.max(1) as f64;
-    let reason = format!(
-        "scene is inside {} of {}",
-        all - needed,
-        counted(all, "plane")
-    );
+    let (inside, planes) = (all - needed, counted(all, "plane"));
+    let reason = format!("scene is inside {inside} of {planes}");
     let left_out = trials.index(&*case.index, fewer);
     let sides = Sides::new(&case.spec.label, BASE, left_out);
     Ok(Draft::new(sides, Finding::new(share, MOST_NEEDED, reason)))
@@ -80,11 +77,8 @@ pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     }
     let mut finding = Finding::none("no plane is ever tested");
     if all > 0 {
-        let reason = format!(
-            "masks leave {} of {} tests",
-            count(fewer as usize),
-            count(all as usize)
-        );
+        let [left, tests] = [fewer, all].map(|tests| count(tests as usize));
+        let reason = format!("masks leave {left} of {tests} tests");
         finding = Finding::new(1.0 - fewer as f64 / all as f64, LEAST_SAVED, reason);
     }
     let (other, views) = (tree.clone(), volumes.clone());

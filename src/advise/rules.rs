@@ -76,10 +76,11 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let alone = check.filter(|_| costs.is_none());
         let change = advice.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
-        // Smaller parts are not measured once another structure is ahead.
-        let least = below.map(|turn| turn.upper);
         let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
         let scan_wins = alone.map_or(taken.is_scan(), wins);
+        // Smaller parts are not measured once another structure is ahead.
+        let measured = change.map(|change| change.measured[0]);
+        let least = below.map(|turn| turn.upper).or(measured).unwrap_or(all);
         // From the whole on where both tie there.
         let below = below.filter(|turn| turn.structure == scan && turn.at < all);
         let crossing = match below {
@@ -87,19 +88,13 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
             Some(turn) => turn.at,
             None => 0.0,
         };
-        let least = least.or(change.map(|change| change.measured[0]));
+        let (least, most) = (count(least as usize), crossing.round() as usize);
         let reason = match crossing {
             _ if costs.is_none() => format!("by all items alone{place}"),
             _ if is_tie == Some(true) => "a scan and a tree tie".to_owned(),
             _ if scan_wins => "a scan wins".to_owned(),
-            0.0 => format!(
-                "no scan wins from {} items on",
-                count(least.unwrap_or(all) as usize)
-            ),
-            _ => format!(
-                "a scan wins up to {}",
-                counted(crossing.round() as usize, "item")
-            ),
+            0.0 => format!("no scan wins from {least} items on"),
+            _ => format!("a scan wins up to {}", counted(most, "item")),
         };
         Finding {
             cost_ns: costs,
@@ -269,11 +264,8 @@ fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
     let from = (testing > 0.0 && removed > 0.0).then_some(testing / removed);
     let pays_from = from.map(|ns| format!(", pays from {}", significant(ns)));
     let pays = (testing / (cost_ns * without)).max(0.0);
-    let reason = format!(
-        "{} ns/{one}{}",
-        significant(cost_ns),
-        pays_from.unwrap_or_default()
-    );
+    let (cost, pays_from) = (significant(cost_ns), pays_from.unwrap_or_default());
+    let reason = format!("{cost} ns/{one}{pays_from}");
     let on = format!("{} {}, as in funnel", gain.stage.name(), gain.back_end);
     let check = Check {
         same_answers: gain.unit == "fragments" || removed == 0.0,

@@ -224,13 +224,11 @@ fn changes(advice: &Advice) -> Vec<String> {
         let found = sides.into_iter().filter_map(|(side, turn)| {
             let turn = turn.as_ref()?;
             let [at, lower, upper] = [turn.at, turn.lower, turn.upper].map(show);
-            let (structure, other) = (&turn.structure, [&upper, &lower]);
+            let structure = &turn.structure;
+            let other = if side == "below" { &lower } else { &upper };
             // No line through a tie at the workload itself.
             Some(match turn.at == change.here {
-                true => format!(
-                    "at {} {structure}, at {at} a tie",
-                    other[usize::from(side == "below")]
-                ),
+                true => format!("at {other} {structure}, at {at} a tie"),
                 false => format!("{side} {at} ({lower} to {upper}) {structure}"),
             })
         });

@@ -134,16 +134,10 @@ impl CompareTable<'_> {
     /// The change that half of the cells would show, for the line on the threshold.
     fn resolves(&self) -> String {
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
-        let found = median(
-            &judged
-                .filter_map(|found| found.resolution)
-                .collect::<Vec<_>>(),
-        );
-        text::some(found, |share| {
-            format!(
-                "; finds changes from about {} %",
-                text::significant(share * 100.0)
-            )
+        let found: Vec<f64> = judged.filter_map(|found| found.resolution).collect();
+        text::some(median(&found), |share| {
+            let percent = text::significant(share * 100.0);
+            format!("; finds changes from about {percent} %")
         })
     }
 
@@ -403,10 +397,8 @@ fn shift_line(shift: &CommonShift) -> String {
     let (metric, ratio) = (shift.metric, percent(shift.ratio));
     let cells = text::counted(shift.cells, "cell");
     let is_open = shift.lower <= Some(1.0) && shift.upper >= Some(1.0);
-    let why = match is_open {
-        true => "",
-        false => "; this comparison cannot tell the machine from the program",
-    };
+    let unknown = "; this comparison cannot tell the machine from the program";
+    let why = if is_open { "" } else { unknown };
     format!("as a whole {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}")
 }
 

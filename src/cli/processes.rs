@@ -391,7 +391,6 @@ pub struct Request {
     /// Files that stand for pipes that only the parent can read.
     pub spooled: BTreeMap<String, PathBuf>,
     /// SHA-256 of the files that the parent has read, to be found the same.
-    #[serde(default)]
     pub files: BTreeMap<String, String>,
     pub job: Job,
     /// The processor to stay on.

@@ -38,6 +38,8 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     axis.ticks = axis.powers(2.0);
     let row = |(place, &&(cell, found)): (usize, &&(&ReportCell, Estimate))| {
         let (time, name, ratio) = (cell.time(), &cell.structure, found.value);
+        let takes = text::some(time, |ns| text::time_within(ns.estimate()));
+        let interval = text::interval(found.ends(), 1.0);
         let next = drawn.get(place + 1);
         Row {
             name: name.clone(),
@@ -46,12 +48,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
             ends: found.ends(),
             inner: None,
             label: format!("{name} {}", times(ratio)),
-            note: format!(
-                "{name}: {}, {}{}",
-                text::some(time, |ns| text::time_within(ns.estimate())),
-                times(ratio),
-                text::interval(found.ends(), 1.0)
-            ),
+            note: format!("{name}: {takes}, {}{interval}", times(ratio)),
             data: format!(
                 " data-rank=\"{}\" data-speedup=\"{ratio}\" data-query-ns=\"{}\"",
                 text::some(cell.rank, |rank| rank.to_string()),

@@ -61,30 +61,26 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
 ///
 /// Each by its worst scene, path and motion; of the others the tree that ages least.
 fn ageing(all: &[&Comparison]) -> Option<String> {
-    let mut worst = BTreeMap::<&str, f64>::new();
-    let longest = ["1000", "100", "10"].into_iter().find(|frames| {
-        let cells = all.iter().flat_map(|c| c.sound());
-        for cell in cells.filter(|cell| !cell.structure.starts_with(YARDSTICK)) {
-            if let Some(ratio) = cell.value(&format!("ageing_{frames}")) {
-                let most = worst.entry(&cell.structure).or_default();
-                *most = most.max(ratio);
-            }
-        }
-        !worst.is_empty()
+    let (longest, mut aged) = ["1000", "100", "10"].into_iter().find_map(|frames| {
+        let trees = all.iter().flat_map(|c| c.sound());
+        let trees = trees.filter(|cell| !cell.structure.starts_with(YARDSTICK));
+        let ratio = |cell: &ReportCell| cell.value(&format!("ageing_{frames}"));
+        let aged = trees.filter_map(|cell| Some((ratio(cell)?, cell.structure.as_str())));
+        let aged: Vec<(f64, &str)> = aged.collect();
+        (!aged.is_empty()).then_some((frames, aged))
     })?;
-    let mut aged: Vec<(&str, f64)> = worst.into_iter().collect();
-    aged.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let old = aged.iter().take(4).filter(|(_, ratio)| *ratio > 2.0);
-    let old: Vec<String> = old
-        .map(|(name, x)| format!("{} ({name})", times(*x)))
-        .collect();
-    let kept = aged.last().filter(|(_, ratio)| *ratio <= 2.0);
-    let kept = text::some(kept, |(name, x)| format!("; {name} stays at {}", times(*x)));
-    let most = ["up to ", ""][usize::from(all.len() == 1)];
-    let old = (!old.is_empty()).then(|| listed(&old, "and"))?;
-    Some(format!(
-        "Queries age: after {longest} frames they take {most}{old} as long as on a fresh build{kept}."
-    ))
+    // The largest of each comes first.
+    aged.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    let mut known = BTreeSet::new();
+    aged.retain(|(_, name)| known.insert(*name));
+    let (old, kept): (Vec<_>, Vec<_>) = aged.into_iter().partition(|(ratio, _)| *ratio > 2.0);
+    let stays = |(ratio, name): &(f64, &str)| format!("; {name} stays at {}", times(*ratio));
+    let kept = text::some(kept.last(), stays);
+    let told = |(ratio, name): &(f64, &str)| format!("{} ({name})", times(*ratio));
+    let old: Vec<String> = old.iter().take(4).map(told).collect();
+    let most = ["up to ", ""][usize::from(all.len() == 1)].to_owned() + &listed(&old, "and");
+    let told = format!("Queries age: after {longest} frames they take {most} as long as");
+    (!old.is_empty()).then(|| format!("{told} on a fresh build{kept}."))
 }
 
 /// Remarks on rebuilds that do not come, and on dropped contacts.
@@ -128,20 +124,18 @@ pub fn sharing<'c>(
     }
     let groups = grouped(shared.iter().map(|work| (what(work), work)));
     let gains = groups.into_iter().map(|(what, own)| {
-        let best = own
-            .iter()
-            .max_by(|a, b| a.wall_gain.total_cmp(&b.wall_gain));
-        let best = best.filter(|best| best.wall_gain > LEAST_GAIN);
-        let gain =
-            best.map(|best| format!("at most {} ({})", times(best.wall_gain), best.structure));
-        format!(
-            "{} from sharing {what}",
-            gain.as_deref().unwrap_or("no gain")
-        )
+        let own = own.into_iter().filter(|work| work.wall_gain > LEAST_GAIN);
+        let gain = match own.max_by(|a, b| a.wall_gain.total_cmp(&b.wall_gain)) {
+            Some(best) => format!("at most {} ({})", times(best.wall_gain), best.structure),
+            None => "no gain".to_owned(),
+        };
+        format!("{gain} from sharing {what}")
     });
     let busy = text::some(machine.busy(), |busy| format!("; {busy}"));
-    let gains = text::joined(gains);
-    let told = format!("{threads} threads: {gains}{busy}. CPU time ranks.");
+    let told = format!(
+        "{threads} threads: {}{busy}. CPU time ranks.",
+        text::joined(gains)
+    );
     Some([Block::Table(table), Block::line(""), Block::Line(told)])
 }
 

@@ -99,10 +99,8 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         sections.extend(found);
     }
     bar.finish_and_clear();
-    if !interrupt::heard()
-        && by_others == 0
-        && sections.iter().all(|section| section.rows.is_empty())
-    {
+    let has_rows = sections.iter().any(|section| !section.rows.is_empty());
+    if !interrupt::heard() && by_others == 0 && !has_rows {
         let files = args.vectors.iter().map(|file| file.display().to_string());
         let files = text::joined(files);
         bail!("{files}: nothing to check; expected planes, a camera or points in a vector");

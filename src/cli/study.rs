@@ -122,9 +122,6 @@ pub fn or_left_out(
     Ok(Ending::Ok)
 }
 
-/// Remaining time that is worth a line where there is no progress bar.
-const LONG: Duration = Duration::from_secs(10);
-
 /// A study on its way.
 pub struct Study {
     pub workers: Workers,
@@ -187,15 +184,8 @@ impl Study {
         interrupt::from_now_on_finish();
         let plan = serde_json::to_value(plan)?;
         let mut all = Vec::new();
-        let started = Instant::now();
+        let mut told = Instant::now();
         for process in 0..self.processes {
-            // A terminal has the bar.
-            let left = started.elapsed() * (self.processes - 1);
-            if process == 1 && self.bar.is_hidden() && left > LONG {
-                let left = HumanDuration(left);
-                let step = format!("at work: {step}: 1 of {} processes done", self.processes);
-                tell!("{step}, {left:#} left");
-            }
             let timing = Timing {
                 process,
                 lens_scale,
@@ -208,6 +198,7 @@ impl Study {
             let job = Job::Times(timing);
             all.extend((self.workers).found(process, job, &|_| self.begin(step), times)?);
             self.bar.inc(1);
+            tell_progress(&self.bar, "steps", &mut told);
         }
         Ok(all)
     }

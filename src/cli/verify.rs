@@ -121,10 +121,8 @@ fn check_path(
     again: &str,
 ) -> anyhow::Result<Vec<Check>> {
     let mut rows: Vec<Check> = Vec::new();
-    for (kind, workload) in workloads(scene, cameras, culling)? {
-        if interrupt::asked() {
-            break;
-        }
+    let workloads = workloads(scene, cameras, culling)?.into_iter();
+    for (kind, workload) in workloads.take_while(|_| !interrupt::asked()) {
         let subjects = match workload.culling.test {
             CullingTest::Sphere => over_spheres,
             _ => over_boxes,
@@ -276,10 +274,8 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         ..Check::default()
     };
     let mut checks: Vec<Check> = structures.iter().map(of).collect();
-    for case_seed in (0..cases).map(|i| seed.wrapping_add(i)) {
-        if interrupt::asked() {
-            break;
-        }
+    let seeds = (0..cases).map(|i| seed.wrapping_add(i));
+    for case_seed in seeds.take_while(|_| !interrupt::asked()) {
         let case = RandomCase::new(case_seed);
         let mut trials = [(); 3].map(|()| Trial::new(case.items.len()));
         let [seen, holding, overlapping] = &mut trials;

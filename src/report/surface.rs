@@ -137,21 +137,15 @@ impl Surface<'_> {
         unique(cells.map(|cell| cell.structure.as_str()))
     }
 
-    /// A metric of a structure over the sizes, at one class of shares; the first
-    /// where several paths fall into it.
-    pub fn curve(&self, structure: &str, class: f64, metric: &str) -> Vec<(usize, f64)> {
-        let places = self.places.iter().filter(|place| place.class == class);
-        let points = places.filter_map(|p| Some((p.items, p.cell(structure)?.value(metric)?)));
-        let mut curve: Vec<(usize, f64)> = points.filter(|point| point.1 > 0.0).collect();
-        curve.dedup_by_key(|point| point.0);
-        curve
-    }
-
     /// Number of items from which a structure is faster than the linear scan for good;
     /// `None` if it is known at one size only. It is faster where that is shown
     /// ([`Estimate::exceeds`]); in between, the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
-        let curve = self.curve(structure, class, "speedup");
+        let places = self.places.iter().filter(|place| place.class == class);
+        let points = places.filter_map(|p| Some((p.items, p.cell(structure)?.value("speedup")?)));
+        let mut curve: Vec<(usize, f64)> = points.filter(|point| point.1 > 0.0).collect();
+        // The first where several paths fall into the class.
+        curve.dedup_by_key(|point| point.0);
         let is_faster = |point: &(usize, f64)| self.is_faster(structure, class, point.0);
         let faster: Vec<bool> = curve.iter().map(is_faster).collect();
         let (first, last) = (curve.first()?, curve.last()?);

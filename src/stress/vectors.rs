@@ -457,12 +457,8 @@ fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
 }
 
 fn word(text: &str) -> Option<f64> {
-    match text.to_ascii_lowercase().as_str() {
-        "nan" => Some(f64::NAN),
-        "inf" | "infinity" => Some(f64::INFINITY),
-        "-inf" | "-infinity" => Some(f64::NEG_INFINITY),
-        _ => None,
-    }
+    let is_word = text.chars().all(|c| c == '-' || c.is_ascii_alphabetic());
+    text.parse().ok().filter(|_| is_word)
 }
 
 fn narrow(number: f64) -> Option<Narrow> {
