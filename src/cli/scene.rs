@@ -205,9 +205,7 @@ struct UntilInterrupted<W>(W);
 
 impl<W: Write> Write for UntilInterrupted<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if interrupt::asked() {
-            return Err(io::Error::other("interrupted"));
-        }
+        interrupt::check().map_err(io::Error::other)?;
         self.0.write(bytes)
     }
 

@@ -227,9 +227,8 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     let centred: Vec<Logs> = timed.iter().map(|(_, logs)| centred(logs)).collect();
     let relative = (0..timed.len()).map(|own| relative(own, &timed, &centred));
     let (was, is): (Vec<_>, Vec<_>) = relative.map(<(_, _)>::from).unzip();
-    let names = timed
-        .iter()
-        .map(|(row, _)| (row.cell.structure.as_str(), row.cell.group.id()));
+    let cells = timed.iter().map(|(row, _)| &row.cell);
+    let names = cells.map(|cell| (cell.structure.as_str(), cell.group.id()));
     let judged = judge_unpaired(&was, &is, &names.collect::<Vec<_>>(), threshold);
     for ((row, _), judgement) in timed.into_iter().zip(judged) {
         row.reason = why_inconclusive(judgement.is_some(), row.processes);

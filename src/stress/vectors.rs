@@ -457,6 +457,7 @@ fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
 }
 
 fn word(text: &str) -> Option<f64> {
+    // A number in quotes is none.
     let is_word = text.chars().all(|c| c == '-' || c.is_ascii_alphabetic());
     text.parse().ok().filter(|_| is_word)
 }

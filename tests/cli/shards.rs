@@ -112,6 +112,10 @@ fn shards_together_are_the_run_of_the_whole_plan() {
     let merged = report(&at("merged"));
     assert_eq!(merged["run"]["shard"], Value::Null);
     assert!(merged["run"]["finished_at"].is_string());
+    let command = merged["run"]["command"].as_str().expect("a command");
+    let is_placed = ["--shard", "--out"].map(|option| command.contains(option));
+    assert!(command.contains(" run --") && command.contains("=city:n=300 "));
+    assert!(is_placed == [false; 2], "{command}");
     // It is a run like any other, and a finished one.
     let before = contents(&at("merged"));
     works(folder.path(), "run --resume --out merged");
