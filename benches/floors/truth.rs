@@ -45,11 +45,19 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     let see: Box<dyn Fn(&Rays) -> SampleTruth> = match surfaces_of(&scene) {
         Some(surfaces) => {
             let index = SurfaceIndex::build(&surfaces);
-            Box::new(move |rays| SampleTruth::of(&index, rays, GRID, 1))
+            Box::new(move |rays| {
+                let truth =
+                    SampleTruth::of_opaque(&index, &|_, _, _| true, rays, GRID, 1, u64::MAX);
+                truth.expect("no limit")
+            })
         }
         None => {
             let index = RayIndex::build(&solids);
-            Box::new(move |rays| SampleTruth::of(&index, rays, GRID, 1))
+            Box::new(move |rays| {
+                let truth =
+                    SampleTruth::of_opaque(&index, &|_, _, _| true, rays, GRID, 1, u64::MAX);
+                truth.expect("no limit")
+            })
         }
     };
     let rates = (0..(turns / 8).max(3)).map(|_| {

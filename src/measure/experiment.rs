@@ -119,8 +119,7 @@ impl Plan {
         };
         let mut groups = Vec::new();
         for path in &scene.paths {
-            let caches = 1 + usize::from(scene.cold);
-            for cold in [false, true].into_iter().take(caches) {
+            for &cold in &[false, true][..1 + usize::from(scene.cold)] {
                 for motion in motions {
                     groups.extend(self.cullings.iter().map(|culling| {
                         let key = GroupKey::of(&scene.source, path, cold, culling, motion);
@@ -160,12 +159,6 @@ impl Plan {
         self.effort.extras == Extras::All
     }
 
-    fn has_updates(&self, share: &Share) -> bool {
-        let is_due = share.process.is_multiple_of(UPDATES_EVERY) && !share.plan_only;
-        // Frames have updates of their own.
-        is_due && self.has_all() && self.motions.is_empty()
-    }
-
     /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
     ///
     /// Structures, cache states, motions and tests of a pair stay together.
@@ -192,6 +185,9 @@ impl Plan {
         share: &Share,
         notice: Notice,
     ) -> Vec<Subject> {
+        let is_due = share.process.is_multiple_of(UPDATES_EVERY) && !share.plan_only;
+        // Frames have updates of their own.
+        let has_updates = is_due && self.has_all() && self.motions.is_empty();
         let mut structures = self.structures.iter();
         let preferred = structures.find(|s| s.row.info.kind != Kind::Scan);
         let twin = preferred.or(self.structures.first());
@@ -212,7 +208,7 @@ impl Plan {
             }
             notice(Some(&spec.label), "building");
             let built = Subject::build(spec.clone(), is_twin, scene, test);
-            if !self.has_updates(share) || is_twin {
+            if !has_updates || is_twin {
                 return built;
             }
             notice(Some(&spec.label), "updating");

@@ -53,7 +53,7 @@ struct Motion {
     tracks: [Option<Arc<Track>>; 3],
 }
 
-/// Animation, number in it, part that it moves, and the channel itself.
+/// Animation, place in it, part that is moved, and the channel itself.
 type Moving<'f> = (usize, usize, usize, &'f Channel);
 
 /// Tracks by input, output, width and interpolation; many channels may name one.

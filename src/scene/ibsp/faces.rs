@@ -59,8 +59,7 @@ pub fn patch(points: &[Vec3], width: usize) -> Faces {
 pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb> {
     let mut bounds = Aabb::EMPTY;
     for axis in 0..3 {
-        let pair = sides.get(2 * axis..2 * axis + 2);
-        match pair {
+        match sides.get(2 * axis..2 * axis + 2) {
             Some(&[(low, behind), (high, before)])
                 if low == -Vec3::AXES[axis] && high == Vec3::AXES[axis] =>
             {

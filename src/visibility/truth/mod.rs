@@ -47,21 +47,10 @@ pub struct SampleTruth {
 }
 
 impl SampleTruth {
-    /// Follows every ray of the grid. O(samples * log n) in common scenes.
-    ///
-    /// `front` holds items that hide; `visible` has these and what is met before them.
-    pub fn of<B: Body>(
-        index: &BodyIndex<B>,
-        rays: &Rays,
-        grid: SampleGrid,
-        threads: usize,
-    ) -> SampleTruth {
-        let all = SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads, u64::MAX);
-        all.expect("no limit")
-    }
-
     /// Follows every ray through a scene of bodies with holes.
     ///
+    /// O(samples * log n) in common scenes.
+    /// `front` holds items that hide; `visible` has these and what is met before them.
     /// A ray ends at the first body that is opaque where the ray meets it. `None`, early, if
     /// `samples_of` would add up to more than `most`.
     pub fn of_opaque<B: Body>(

@@ -213,10 +213,9 @@ impl Ground for SectorGround {
                 out.extend(line.sectors.iter().flatten());
             }
         });
-        match self.sector_at((b.min + b.max).truncate() * 0.5) {
-            Some(sector) => out.push(sector),
-            None => inside = false,
-        }
+        let sector = self.sector_at((b.min + b.max).truncate() * 0.5);
+        inside &= sector.is_some();
+        out.extend(sector);
         // Below a floor or above a ceiling is nowhere.
         inside
             && out[first..].iter().all(|&sector| {

@@ -4,11 +4,24 @@ mod boxes;
 pub mod judge;
 mod triangles;
 
-use super::{Body, BodyIndex, Front};
+use super::{Body, BodyIndex, Front, SampleTruth};
 use crate::query::{ItemId, distinct};
 use crate::scene::SeededRng;
 use crate::threads;
-use crate::visibility::Rays;
+use crate::visibility::{Rays, SampleGrid};
+
+impl SampleTruth {
+    /// Follows every ray of the grid through bodies without holes.
+    pub fn of<B: Body>(
+        index: &BodyIndex<B>,
+        rays: &Rays,
+        grid: SampleGrid,
+        threads: usize,
+    ) -> SampleTruth {
+        let all = SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads, u64::MAX);
+        all.expect("no limit")
+    }
+}
 
 /// Items visible along any of `count` seeded random rays through the window.
 ///
