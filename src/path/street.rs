@@ -203,7 +203,9 @@ fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
 }
 
 impl Column {
-    /// Adds a part of an item, those of which follow each other; true if it is the first.
+    /// Adds a part of an item; true if it is the first of them.
+    ///
+    /// Those of one item follow each other.
     fn add(&mut self, part: Span) -> bool {
         let last = self.spans.last_mut();
         let Some(span) = last.filter(|span| span.item == part.item) else {

@@ -76,7 +76,9 @@ const SMALLEST: f32 = 1e-4;
 /// It takes as long as a build from three eighths moved on, below from three quarters on.
 const LARGE: usize = 10_000;
 
-/// The crate's tree; true if over shapes scaled to a reach of 1,000, its nodes then fitted.
+/// The crate's tree; true if over shapes scaled to a reach of 1,000.
+///
+/// Its nodes are then fitted.
 ///
 /// If areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
