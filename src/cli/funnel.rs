@@ -262,13 +262,11 @@ pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
         Some(Fate::Lost) => 5,
     };
     let (name, path) = (&report.scene, &report.path);
-    let which = Some(view.of).filter(|of| *of > 1);
-    let which = text::some(which, |of| format!(" of {of} that sees most,"));
     let bad = Some(scene.skipped_items).filter(|bad| *bad > 0);
     let items = text::some(bad, |bad| text::items(scene.items.len(), bad));
     Plan {
         caption: text::joined([
-            &format!("{name}, {path}: the view{which} from above"),
+            &format!("{name}, {path}: the view that sees most, from above"),
             &items,
         ]),
         scene,

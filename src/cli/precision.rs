@@ -19,7 +19,6 @@ use crate::index::Registry;
 use crate::measure::{ProcessTimes, Status};
 use crate::precision::{self, Names, Point, Precision, SWEEPS, Sweep, SweepRow, sweep};
 use crate::report::grouped;
-use crate::statistics::Estimate;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> Result<Ending> {
     let outputs = [("--svg", &args.svg), ("--html", &args.html)];
@@ -259,7 +258,7 @@ fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     }
     let title = "Pareto front of error, memory and time, fastest first";
     let whole = front_table(p, all);
-    let front = whole.within(room, &["FP 95 %", "tie", "alike", "B/item"]);
+    let front = whole.within(room, &["tie", "alike", "B/item"]);
     let heads = whole.header.iter();
     let gone = match text::joined(heads.filter(|head| !front.header.contains(head))) {
         none if none.is_empty() => none,
@@ -363,10 +362,6 @@ fn front_table(p: &Precision, all: bool) -> Table {
             none => text::rate(none, 100.0),
         }),
         (">FN ppm", |p| text::rate(p[0].false_negative_ppm, 1.0)),
-        (">FP 95 %", |p| {
-            let found = p[0].excess.filter(|found| found.value > 0.0);
-            text::interval(found.and_then(Estimate::ends), 0.01)
-        }),
         ("tie", |p| if p[0].is_tie { "tie" } else { "" }.to_owned()),
     ];
     let rows = alike.into_iter().map(|(_, mut points)| {
@@ -443,7 +438,7 @@ mod tests {
                 false_negatives: misses,
                 ..Default::default()
             });
-            row.false_negative_ppm = Some(Estimate {
+            row.false_negative_ppm = Some(crate::statistics::Estimate {
                 value: misses as f64,
                 lower: None,
                 upper: Some(bound + 9.0 * misses as f64),

@@ -216,10 +216,7 @@ impl KernelArgs {
             "kernel '{kernel}' needs instructions that this processor does not have; available: {}",
             text::joined(Kernel::available().map(Kernel::name))
         );
-        let again = |n: &&usize| self.threads.iter().filter(|other| other == n).count() > 1;
-        if let Some(n) = self.threads.iter().find(again) {
-            bail!("--threads: {n} is named twice; expected each once");
-        }
+        each_once("--threads", self.threads.iter().map(ToString::to_string))?;
         Ok(Execution {
             kernel,
             threads: self.threads.iter().copied().max().unwrap_or(1),

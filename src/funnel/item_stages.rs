@@ -209,8 +209,6 @@ pub enum Fate {
 /// The view that sees most items, with the fate of each.
 #[derive(Clone, Default, Debug)]
 pub struct PlanView {
-    /// Number of views that it is chosen from.
-    pub of: usize,
     /// Its camera; `None` if there is no view.
     pub camera: Option<Camera>,
     /// Fates by item.
@@ -233,7 +231,6 @@ impl PlanView {
         let items = (0..).take(world.scene.items.len());
         let fates = items.map(|item| fate(item, &left, is_visible(item)));
         PlanView {
-            of: world.views.len(),
             camera: Some(view.rays.camera),
             fates: fates.collect(),
         }

@@ -180,12 +180,14 @@ fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
             let column = &mut columns[c as usize];
             let beside = column.y < min.y - CLEARANCE || column.y > max.y + CLEARANCE;
             if !beside && min.z <= column.high && max.z >= column.low {
-                held += usize::from(column.add(Span {
+                held -= column.spans.len();
+                column.add(Span {
                     item,
                     bottom: min.z,
                     top: max.z,
                     is_ground,
-                }));
+                });
+                held += column.spans.len();
             }
         }
         held <= most
@@ -203,25 +205,41 @@ fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
 }
 
 impl Column {
-    /// Adds a part of an item; true if it is the first of them.
-    ///
-    /// Those of one item follow each other.
-    fn add(&mut self, part: Span) -> bool {
-        let last = self.spans.last_mut();
-        let Some(span) = last.filter(|span| span.item == part.item) else {
-            self.spans.push(part);
-            return true;
-        };
-        span.bottom = span.bottom.min(part.bottom);
-        span.top = span.top.max(part.top);
-        span.is_ground &= part.is_ground;
-        false
+    /// A part of an item; those of one item follow each other.
+    fn add(&mut self, part: Span) {
+        match self.spans.last_mut() {
+            Some(span) if span.item == part.item => {
+                span.bottom = span.bottom.min(part.bottom);
+                span.top = span.top.max(part.top);
+                span.is_ground &= part.is_ground;
+            }
+            _ => {
+                if self.spans.len() == self.spans.capacity() {
+                    self.merge();
+                    self.spans.reserve(self.spans.len().max(1));
+                }
+                self.spans.push(part);
+            }
+        }
+    }
+
+    /// Sorts the spans and joins those that overlap above the lowest item.
+    fn merge(&mut self) {
+        self.spans.sort_by(|a, b| a.bottom.total_cmp(&b.bottom));
+        let lowest = self.spans.first().map(|span| span.item);
+        self.spans.dedup_by(|span, below| {
+            let is_within = Some(below.item) != lowest && span.bottom <= below.top;
+            if is_within {
+                below.top = below.top.max(span.top);
+            }
+            is_within
+        });
     }
 
     /// The lowest level with so much room above it: on the lowest item, or on what
     /// stands on that, or on the floor where there is no item at all.
     fn level(&mut self, room: f64) -> f64 {
-        self.spans.sort_by(|a, b| a.bottom.total_cmp(&b.bottom));
+        self.merge();
         let mut ground = self.low;
         for (i, span) in self.spans.iter().enumerate() {
             // Below the lowest item is under the ground.
@@ -260,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_level_with_room_is_found() {
+    fn spans_that_overlap_are_kept_as_one() {
         let mut rng = SeededRng::new(1);
         for _ in 0..300 {
             let (range, thickness) = (rng.between(1.0, 100.0), rng.between(0.0, 5.0));
@@ -285,6 +303,8 @@ mod tests {
             assert_eq!(lowest, foot);
             assert_eq!(merged.spans[0].top, top);
         }
+        let many = column((0..10_000).map(|item| [5.0, 6.0 + f64::from(item % 7)]));
+        assert!(many.spans.capacity() <= 16, "{}", many.spans.capacity());
     }
 
     #[test]

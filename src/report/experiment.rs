@@ -7,7 +7,7 @@ use super::Report;
 use super::stream::{Header, KeptPart, Stream, digits, utc};
 use crate::index::StructureSpec;
 use crate::measure::{
-    Effort, ExperimentError, Extras, Machine, Notice, Part, Plan, PlannedScene, Share,
+    Effort, ExperimentError, Extras, Machine, Part, PathOf, Plan, PlannedScene, Share,
     measure_loaded, measure_scene,
 };
 use crate::path::{self, CameraPath};
@@ -127,18 +127,18 @@ impl Experiment {
                     ..KeptPart::default()
                 });
             };
-            let (plan, notice): (_, Notice) = (&self.plan, &|_, _| ());
             let held = self.held.as_ref();
-            match held.filter(|(scene, _)| scene.name == planned.source) {
-                None => measure_scene(plan, planned, &share, &mut keep, notice)?,
-                Some((scene, own)) => {
-                    let path = |name: &str, scale| match name == own.name {
-                        true => Ok(own.clone()),
-                        false => path::load_scaled(name, scene, &plan.lens, scale),
-                    };
-                    measure_loaded(plan, planned, &share, (scene, &path), &mut keep, notice)?;
-                }
-            }
+            let held = held.filter(|(scene, _)| scene.name == planned.source);
+            let Some((scene, own)) = held else {
+                measure_scene(&self.plan, planned, &share, &mut keep, &|_, _| ())?;
+                continue;
+            };
+            let path = |name: &str, scale| match name == own.name {
+                true => Ok(own.clone()),
+                false => path::load_scaled(name, scene, &self.plan.lens, scale),
+            };
+            let world = (scene, &path as PathOf);
+            measure_loaded(&self.plan, planned, &share, world, &mut keep, &|_, _| ())?;
         }
         stream.finished_at = Some(utc(SystemTime::now()));
         Ok(stream.report())

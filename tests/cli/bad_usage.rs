@@ -73,7 +73,7 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
     all_refused(
         &folder,
         &[twice],
-        "--threads: 1 is named twice; expected each once",
+        "--threads '1' is named twice; expected each once",
     );
 }
 
