@@ -4,7 +4,8 @@ use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{
-    LoadOptions, Scene, read_boxes_csv, read_bytes, read_obj, read_sought_boxes_csv, write_boxes_csv,
+    LoadOptions, Scene, read_boxes_csv, read_bytes, read_obj, read_sought_boxes_csv,
+    write_boxes_csv,
 };
 use cullbench::stress::{Vector, read_vectors, replay};
 
