@@ -187,14 +187,14 @@ mod tests {
 
     /// Quiet cells say nothing of the one beside them.
     #[test]
-    fn a_restless_cell_keeps_its_variance() {
-        let restless = |centre: f64| -> Vec<f64> {
+    fn a_noisy_cell_keeps_its_variance() {
+        let noisy = |centre: f64| -> Vec<f64> {
             let scatter = |i: i32| centre + 0.1 * (f64::from(i) - 4.5);
             (0..10).map(scatter).collect()
         };
         let names: Vec<(usize, usize)> = (0..40).map(|cell| (cell, cell)).collect();
         let [mut old, mut new] = [vec![side(0.0); 40], vec![side(0.0); 40]];
-        (old[0], new[0]) = (restless(0.0), restless(0.45));
+        (old[0], new[0]) = (noisy(0.0), noisy(0.45));
         let alone = judge_unpaired(&old[..1], &new[..1], &names[..1], 0.05)[0].unwrap();
         let among = judge_unpaired(&old, &new, &names, 0.05)[0].unwrap();
         assert_eq!(among.lower, alone.lower);

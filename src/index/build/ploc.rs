@@ -1,7 +1,7 @@
 //! The binary tree that crate obvhs builds.
 //!
 //! The steps of its helper `build_bvh2` without the validation that ends it in debug builds.
-//! That one recurses once a level and compares with a depth noted before reinsertion, which may
+//! The validation recurses once a level and compares with a depth noted before reinsertion, which may
 //! have made the tree deeper: deep trees panic or overflow the stack. No walk here relies on
 //! either.
 //!
