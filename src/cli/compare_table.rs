@@ -54,17 +54,19 @@ impl CompareTable<'_> {
             _ if self.args.fail_inconclusive && is_undecided => {
                 (Ending::Regression, "inconclusive")
             }
-            (false, false) => (Ending::Ok, "ok"),
+            (false, false) => {
+                let outcomes = self.changes.rows.iter().map(|row| row.outcome);
+                let mut judged = outcomes.filter(|outcome| outcome.is_judged()).peekable();
+                let is_open = judged.peek().is_some() && judged.all(|o| o == Outcome::Inconclusive);
+                let name = if is_open { "nothing_was_decided" } else { "ok" };
+                (Ending::Ok, name)
+            }
         }
     }
 
     /// The verdict, the counts and the worst cell, in a sentence.
     fn summary(&self) -> String {
-        let outcomes = self.changes.rows.iter().map(|row| row.outcome);
-        let mut judged = outcomes.filter(|outcome| outcome.is_judged()).peekable();
-        let is_open = judged.peek().is_some() && judged.all(|o| o == Outcome::Inconclusive);
         let verdict = match self.verdict().1 {
-            "ok" if is_open => "nothing was decided".to_owned(),
             "ok" => "no regression".to_owned(),
             other => other.replace('_', " "),
         };

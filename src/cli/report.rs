@@ -218,7 +218,9 @@ fn sharing(report: &Report, comparison: &Comparison) -> Option<[Block; 3]> {
 fn of_comparison(comparison: &Comparison, base: Option<&str>, views: Option<&Views>) -> Vec<Block> {
     let about = comparison.about();
     let path = &about.path;
-    let heading = text::joined([&path.name, &path.cache, &about.test, &path.motion]);
+    let heading = [&path.name, &path.cache, &about.test, &path.motion].map(String::clone);
+    let group = about.key().group;
+    let heading = text::joined(heading.into_iter().chain(run_table::unusual(&group)));
     let mut blocks = vec![Block::Heading(3, heading)];
     blocks.extend(run_table::heads(comparison).into_iter().map(Block::Line));
     blocks.push(Block::Line(text::basis(comparison)));
@@ -242,15 +244,32 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Shows the basis of a run, further lines, its files and another file.
+/// Shows the basis of a run, its warnings, the next command, its files and another file.
+///
+/// `how` is behind the number of cells: how long they took, or whence they are.
 pub fn close(
-    basis: &str,
-    lines: impl IntoIterator<Item = String>,
+    report: &Report,
+    how: &str,
+    next: Option<String>,
     folder: &Path,
     other: Option<String>,
 ) -> io::Result<()> {
-    let mut told = vec![String::new(), text::wrapped(basis, text::width())];
-    told.extend(lines);
+    let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
+    let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
+    let cells = text::counted(report.cells.len(), "cell");
+    let failed = format!(
+        "{} {}",
+        failed.count(),
+        ["failed", "wrong"][usize::from(is_wrong)]
+    );
+    let basis = format!("{cells}{how}, {failed}; {}", text::conclusion(report));
+    let warnings = report.noise.warnings.iter().chain(&report.run.left_out);
+    let warnings = warnings.map(|said| format!("warning: {said}"));
+    let lines = [String::new(), basis].into_iter().chain(warnings);
+    let mut told: Vec<String> = lines
+        .map(|line| text::wrapped(&line, text::width()))
+        .collect();
+    told.extend(next);
     told.push(format!("report  {}", folder.join("report.html").display()));
     let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";
     let others = text::wrapped(others, text::width().saturating_sub(8)) + "\n";

@@ -22,7 +22,7 @@ use super::{Ending, compare, expect_folder, program, run_why, text, unread_is_fi
 use crate::index::Registry;
 use crate::input;
 use crate::measure::{
-    GroupKey, Machine, Part, PathInfo, Plan, SceneInfo, Share, Status, SubjectPart, Verdict,
+    GroupKey, Machine, Part, PathInfo, Plan, SceneInfo, Share, SubjectPart, Verdict,
 };
 use crate::path::DEFAULT_PATH;
 use crate::report::{
@@ -271,23 +271,15 @@ impl<'a> Run<'a> {
     }
 
     fn close(&self, report: &Report, save: Option<&str>) -> io::Result<()> {
-        let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
-        let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
-        let width = text::width();
-        let cells = text::counted(report.cells.len(), "cell");
-        let (failed, seconds) = (failed.count(), self.started.elapsed().as_secs_f64());
-        let how = ["failed", "wrong"][usize::from(is_wrong)];
-        let basis = text::conclusion(report);
+        let seconds = self.started.elapsed().as_secs_f64();
         let time = [" in", ", resumed for"][usize::from(self.resumes)];
-        let basis = format!("{cells}{time} {seconds:.1} s, {failed} {how}; {basis}");
-        let warnings = report.noise.warnings.iter().chain(&report.run.left_out);
-        let warnings = warnings.map(|said| text::wrapped(&format!("warning: {said}"), width));
         let kept = save.map(|name| {
             let file = compare::baseline_file(name);
             format!("{}: compare --baseline {name}", file.display())
         });
-        let lines = warnings.chain(next(report, &self.stream.header.args, width));
-        close(&basis, lines, &self.folder.path, kept)
+        let next = next(report, &self.stream.header.args, text::width());
+        let time = format!("{time} {seconds:.1} s");
+        close(report, &time, next, &self.folder.path, kept)
     }
 }
 
@@ -358,9 +350,7 @@ pub fn merge(args: &MergeArgs) -> Result<Ending> {
     let report = merged.stream.report();
     write_page(&report, &args.out, Vec::new())?;
     unread_is_fine(show(&shown(&report, false, text::width())))?;
-    let cells = text::counted(report.cells.len(), "cell");
-    let shards = text::counted(args.runs.len(), "shard");
-    let basis = format!("{cells} of {shards}; {}", text::conclusion(&report));
-    unread_is_fine(close(&basis, None, &args.out, None))?;
+    let shards = format!(" of {}", text::counted(args.runs.len(), "shard"));
+    unread_is_fine(close(&report, &shards, None, &args.out, None))?;
     Ok(Ending::of(!report.has_failed()))
 }

@@ -86,7 +86,8 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
             Some(format!("{share} % false positives{sources}"))
         }
     };
-    let asked = text::joined([&views, &cell.test, cache.unwrap_or_default()]);
+    let asked = [&views, &cell.test, cache.unwrap_or_default()].map(str::to_owned);
+    let asked = text::joined(asked.into_iter().chain(unusual(&cell.key().group)));
     let lens = path.lens.as_ref();
     let matrix = lens.and_then(|lens| lens.matrix.as_ref());
     let matrices = matrix.map(scene_facts::matrices);
@@ -246,11 +247,18 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     let lens = about().filter_map(|cell| cell.path.lens.clone());
     let lens = lens.reduce(CameraFacts::with);
     let lens = lens.as_ref().map(scene_facts::lens);
-    let [cache, test, _] = all.first().map(|one| key(one)).unwrap_or_default();
-    let cache = if cache == "warm" { "" } else { ", cold" };
-    let lens = lens.map(|lens| format!("{test}{cache}; {} up; {lens}", up.join(" or ")));
+    let group = about().next().map(|about| about.key().group);
+    let cold = |group: &GroupKey| (group.cache != "warm").then(|| group.cache.clone());
+    let asked = text::some(group, |group| {
+        let test = [group.test.clone()].into_iter().chain(cold(&group));
+        text::joined(test.chain(unusual(&group)))
+    });
+    let lens = lens.map(|lens| format!("{asked}; {} up; {lens}", up.join(" or ")));
     let cut = |label: &String| text::without_middle(&text::plain(label), [width / 4; 2]);
-    let names = distinct(&labels(all), cut, |label| text::plain(label));
+    let labels = labels(all);
+    let names = distinct(&labels, cut, |label| {
+        about_difference(label, &labels, width / 2)
+    });
     let mut parts = matrix(names, all, overall).parts(width);
     let hidden = parts.split_off(1);
     let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
@@ -282,6 +290,22 @@ pub fn labels(all: &[&Comparison]) -> Vec<String> {
     };
     let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
     distinct(&keys, |key| of(key, short), |key| of(key, str::to_owned))
+}
+
+/// The beginning of a label, and the part where it first differs from the most similar other.
+fn about_difference(label: &str, all: &[String], room: usize) -> String {
+    let alike = |other: &String| {
+        let both = label.chars().zip(other.chars());
+        both.take_while(|(own, other)| own == other).count()
+    };
+    let others = all.iter().filter(|other| *other != label);
+    let (head, same) = (room / 4, others.map(alike).max().unwrap_or(0));
+    let rest = label.chars().skip(same.saturating_sub(room / 4).max(head));
+    let head = text::shortened(label, head);
+    head + &text::without_middle(
+        &text::plain(&rest.collect::<String>()),
+        [room / 2, room / 8],
+    )
 }
 
 /// Short names; the full ones where two that differ have the same.
@@ -398,7 +422,7 @@ pub fn question(group: &GroupKey) -> String {
 }
 
 /// Arithmetic, plane derivation and epsilon, where they are no defaults.
-fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
+pub fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
     let usual = GroupKey::of("", "", false, &Culling::default(), "");
     let epsilon = |key: &GroupKey| format!("epsilon {}", key.epsilon);
     let facts = |key: &GroupKey| [key.arithmetic.clone(), key.planes.clone(), epsilon(key)];

@@ -270,7 +270,7 @@ pub(super) fn ageing(
     notice: Notice,
 ) -> Result<BTreeMap<usize, f64>, Verdict> {
     notice(Some(&spec.label), "ageing");
-    let mut ages = BTreeMap::new();
+    let (mut ages, mut out) = (BTreeMap::new(), Vec::new());
     let mut moving = Moving::build(frames, spec)?;
     let last = AGES.into_iter().rfind(|age| *age <= frames.motion.frames);
     for frame in 1..=last.unwrap_or(0) {
@@ -279,6 +279,13 @@ pub(super) fn ageing(
         moving.update()?;
         if moving.refused > 0 {
             break;
+        }
+        // A structure that chooses goes by its queries, too.
+        if moving.index.chose().is_some() {
+            for (_, view) in frames.views(frame) {
+                out.clear();
+                guarded(|| moving.index.query(view.as_any(), &mut out))?;
+            }
         }
         if AGES.contains(&frame) {
             let aged = moving.index.as_ref();

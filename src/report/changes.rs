@@ -29,8 +29,8 @@ pub enum Basis {
     /// Two stored reports.
     ///
     /// Per process, ln(time) of a structure minus the median of the other structures that
-    /// both reports have in the group, each about its mean in the old report; old and new
-    /// by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
+    /// both reports have in the group (of an odd number, the structure itself with them if need
+    /// be), each about its mean in the old report; old and new by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
     Reports,
     /// Pairs of processes in turns: times as they are, by [`judge`].
     Pairs,
@@ -285,16 +285,20 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 
 /// ln(time) less what moved the median of the others, process by process;
 /// nothing with too few others.
+///
+/// The structure itself counts among an even number of others: the median of four moves with
+/// two of them, that of five does not.
 fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {
         let (key, own) = (&other.cell, &row.cell);
         key.group == own.group && key.structure != own.structure && other.processes == row.processes
     });
-    let others: Vec<&Logs> = others.map(|(_, centred)| centred).collect();
+    let mut others: Vec<&Logs> = others.map(|(_, centred)| centred).collect();
     if others.len() < LEAST_OTHERS {
         return Logs::default();
     }
+    others.extend(others.len().is_multiple_of(2).then_some(&centred[own]));
     let side = |side: usize| -> Vec<f64> {
         let relative = logs[side].iter().enumerate().filter_map(|(process, ln)| {
             let others: Vec<f64> = others.iter().map(|o| o[side][process]).collect();

@@ -36,7 +36,10 @@ impl Labels {
     /// Zero bytes, which no CSV file may have, become replacement characters.
     pub fn push(&mut self, value: &str) {
         let known = self.numbers.get(value).copied();
-        let number = known.unwrap_or_else(|| {
+        // Triangles of one object follow each other.
+        let last = self.of_item.last().copied();
+        let same = last.filter(|&number| self.text(number as usize) == value);
+        let number = known.or(same).unwrap_or_else(|| {
             let number = self.ends.len() as u32;
             self.texts += &value.replace('\0', "\u{fffd}");
             self.ends.push(self.texts.len());
@@ -99,6 +102,11 @@ mod tests {
         }
         let own = [id.get(count - 1), id.get(count), id.get(count + 1)];
         assert_eq!(own, ["8191", "a\u{fffd}b", "8000"]);
+        assert_eq!(
+            id.ends.len(),
+            count + 2,
+            "a text that follows itself is kept once"
+        );
         let histogram = id.histogram();
         assert_eq!(histogram.len(), count + 1);
         assert_eq!(histogram[..2], [("8000", 3), ("0", 1)]);

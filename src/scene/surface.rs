@@ -92,23 +92,43 @@ impl Surfaces {
         all
     }
 
-    /// The opaque, one-sided triangles of an item, as the only item.
+    /// The opaque triangles of an item, as the only item, if they are closed; if not, the
+    /// one-sided ones of them.
+    ///
+    /// Points of one place are one point: files have several, for each normal one.
     ///
     /// # Panics
     /// If there is no such item.
     pub fn solid_part(&self, item: usize) -> Surfaces {
-        let range = self.range(item);
-        let own = self.triangles[range.clone()].as_flattened();
-        let first = own.iter().min().map_or(0, |first| *first);
-        let end = own.iter().max().map_or(0, |last| last + 1);
-        let is_solid = |at: &usize| self.kinds[*at] == SurfaceKind::Opaque && !self.two_sided[*at];
-        let solid = range.filter(is_solid);
-        let triangles = solid.map(|at| self.triangles[at].map(|p| p - first));
-        let triangles: Vec<[u32; 3]> = triangles.collect();
-        let points = &self.points[first as usize..end as usize];
-        let mut part = Surfaces::about(self.origin);
-        part.push(SurfaceKind::Opaque, false, points, &triangles);
-        part
+        let opaque = self.range(item);
+        let opaque = opaque.filter(|&at| self.kinds[at] == SurfaceKind::Opaque);
+        let opaque: Vec<usize> = opaque.collect();
+        let part = |sides: [bool; 2]| {
+            let (mut places, mut points) = (HashMap::new(), Vec::new());
+            let own = opaque
+                .iter()
+                .filter(|&&at| sides.contains(&self.two_sided[at]));
+            let triangles = own.map(|&at| {
+                self.corners(at as u32).map(|p| {
+                    // No negative zero.
+                    *places
+                        .entry((p + 0.0).to_array().map(f32::to_bits))
+                        .or_insert_with(|| {
+                            points.push(p);
+                            points.len() as u32 - 1
+                        })
+                })
+            });
+            let triangles: Vec<[u32; 3]> = triangles.collect();
+            let mut part = Surfaces::about(self.origin);
+            part.push(SurfaceKind::Opaque, false, &points, &triangles);
+            part
+        };
+        let all = part([false, true]);
+        match all.open_edges(0) {
+            0 => all,
+            _ => part([false, false]),
+        }
     }
 
     /// Appends the twelve triangles of a scene-local box as an item.
@@ -228,18 +248,21 @@ impl Surfaces {
         })
     }
 
-    /// Number of directed edges of an item that lack their opposite, or have it more
-    /// than once: zero for a closed surface whose triangles are wound alike. Edges are
-    /// told apart by their indices. O(t log t).
+    /// Number of edges of an item that are not gone along as often one way as the other:
+    /// zero for closed surfaces whose triangles are wound alike. Edges are told apart by
+    /// their indices. O(t log t).
     pub fn open_edges(&self, item: usize) -> usize {
         let triangles = self.triangles[self.range(item)].iter();
         let edges = triangles.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let mut edges: Vec<([u32; 2], bool)> =
-            edges.map(|(a, b)| ([a.min(b), a.max(b)], a < b)).collect();
+        let mut edges: Vec<([u32; 2], bool)> = edges
+            .filter(|(a, b)| a != b)
+            .map(|(a, b)| ([a.min(b), a.max(b)], a < b))
+            .collect();
         edges.sort_unstable();
-        let matched = |run: &&[([u32; 2], bool)]| matches!(run, [(_, false), (_, true)]);
-        let runs = edges.chunk_by(|a, b| a.0 == b.0);
-        runs.filter(|run| !matched(run)).map(<[_]>::len).sum()
+        let is_open = |run: &&[([u32; 2], bool)]| {
+            2 * run.iter().filter(|(_, upward)| *upward).count() != run.len()
+        };
+        edges.chunk_by(|a, b| a.0 == b.0).filter(is_open).count()
     }
 
     /// The triangles of an item as a range of indices.
@@ -372,6 +395,35 @@ mod tests {
             assert!(part.of(0).eq(mesh.of(item)));
             assert_eq!(part.open_edges(0), 0);
         }
+    }
+
+    /// As exporters write a cube: corners once per face, seen from both sides, and a triangle
+    /// without area at an edge.
+    #[test]
+    fn a_body_of_several_points_per_place_is_closed() {
+        let unit = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        // Zero and negative zero are one place.
+        let sign = [Vec3::ONE, Vec3::NEG_ONE];
+        let split = BOX.as_flattened().iter().zip(sign.iter().cycle());
+        let split = split.map(|(&i, sign)| {
+            let p = unit.corner(i as usize);
+            Vec3::select(p.cmpeq(Vec3::ZERO), p * *sign, p)
+        });
+        let mut points: Vec<Vec3> = split.collect();
+        points.extend([points[0], points[0], points[1]]);
+        let triangles: Vec<[u32; 3]> = (0..13).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let mut surfaces = Surfaces::about(DVec3::ZERO);
+        surfaces.push(SurfaceKind::Opaque, true, &points, &triangles);
+        surfaces.push(SurfaceKind::Opaque, true, &points, &triangles[1..]);
+        assert_eq!(
+            (
+                surfaces.solid_part(0).open_edges(0),
+                surfaces.solid_part(0).points.len()
+            ),
+            (0, 8)
+        );
+        // Open ones from both sides are none.
+        assert!(surfaces.solid_part(1).triangles.is_empty());
     }
 
     #[test]

@@ -115,9 +115,10 @@ pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
         let path = record.file_path();
         if !record.is_dir() {
+            let name = String::from_utf8(path.as_ref().to_vec());
+            let name = name.unwrap_or_else(|bytes| of_code_page(bytes.as_bytes()));
             // Zips of old .NET programs have backslashes.
-            let name = String::from_utf8_lossy(path.as_ref()).replace('\\', "/");
-            all.push((name, record));
+            all.push((name.replace('\\', "/"), record));
         }
     }
     let mut seen = HashSet::new();
@@ -125,6 +126,18 @@ pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     all.retain(|(name, _)| seen.insert(name.clone()));
     all.reverse();
     Ok(all)
+}
+
+/// A name in code page 437, as names of zip archives are that are no UTF-8.
+fn of_code_page(name: &[u8]) -> String {
+    const UPPER_HALF: &str = "ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜ¢£¥₧ƒáíóúñÑªº¿⌐¬½¼¡«»░▒▓│┤╡╢╖╕╣║╗╝╜╛┐\
+                              └┴┬├─┼╞╟╚╔╩╦╠═╬╧╨╤╥╙╘╒╓╫╪┘┌█▄▌▐▀αßΓπΣσµτΦΘΩδ∞φε∩≡±≥≤⌠⌡÷≈°∙·√ⁿ²■\u{a0}";
+    let upper: Vec<char> = UPPER_HALF.chars().collect();
+    let decoded = |byte: &u8| match byte.checked_sub(128) {
+        Some(place) => upper[usize::from(place)],
+        None => char::from(*byte),
+    };
+    name.iter().map(decoded).collect()
 }
 
 /// Tells by the name.
@@ -251,6 +264,15 @@ pub mod tests {
         assert_eq!(part_names(&in_front, "a.pk3").unwrap(), ["in/one.csv"]);
         let of_net = packed(&[("in\\one.csv", BOX, 8)]);
         assert_eq!(read(&of_net, Some("in/one.csv")), Ok(1));
+        let mut old = packed(&[("in<.csv", BOX, 0), ("in>.csv", BOX, 0)]);
+        for byte in &mut old {
+            *byte = match *byte {
+                b'<' => 0x81,
+                b'>' => 0x84,
+                other => other,
+            };
+        }
+        assert_eq!(part_names(&old, "a.zip").unwrap(), ["inü.csv", "inä.csv"]);
         let wad = packed(&[("maps/d.wad", MAP12, 8), ("two.csv", BOX, 0)]);
         let alone = read(MAP12, None);
         for part in ["maps/d.wad", "maps/d.wad#map12"] {

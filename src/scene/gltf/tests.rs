@@ -345,6 +345,8 @@ fn what_the_specification_allows_is_read() {
     push(&mut file["meshes"][0]["primitives"], bare.clone());
     push(&mut file["meshes"], json!({"primitives": [bare]}));
     file["nodes"][2]["mesh"] = json!(1);
+    file["nodes"][0]["extras"] = json!([5, "any"]);
+    file["asset"]["extras"] = json!(5);
     let scene = read(&file).unwrap();
     assert_eq!(scene.items, read(&animated()).unwrap().items);
     assert_eq!(

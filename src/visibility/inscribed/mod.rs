@@ -34,7 +34,7 @@ pub struct Inscribed {
     /// Volume of the boxes over `volume`, 1 less the loss; where pieces overlap, both
     /// count.
     pub share: f64,
-    /// Volume of the opaque, one-sided triangles.
+    /// Volume within the opaque triangles.
     pub volume: f64,
 }
 
@@ -55,7 +55,7 @@ const TRIES: usize = 4;
 
 /// Large axis-parallel boxes inside an item: of whole cells, by a grid of `cells`
 /// (4 to 64) along each axis of each of its pieces; of all these the `most` (up to
-/// [`MOST_BOXES`]) that add most. Counts opaque, one-sided triangles only; `None` where
+/// [`MOST_BOXES`]) that add most. Counts opaque triangles only; `None` where
 /// these are not closed, or no box was found. O(t + cells⁴), both for each box.
 pub fn inscribed_boxes(
     surfaces: &Surfaces,
@@ -168,7 +168,7 @@ fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
 pub struct InnerRow {
     /// Items of the mesh.
     pub item_count: usize,
-    /// Items that have a box inside: opaque, one-sided and closed.
+    /// Items that have a box inside: opaque and closed.
     pub boxed_count: usize,
     /// Most boxes of an item.
     pub box_limit: usize,

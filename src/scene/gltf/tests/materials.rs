@@ -55,8 +55,7 @@ fn each_triangle_has_the_material_of_its_primitive() {
     let whole = scene.surfaces.as_ref().expect("triangles");
     let solid = whole
         .range(1)
-        .skip(8)
-        .take(4)
+        .filter(|t| [0, 2].contains(&(t / 4 % 4)))
         .map(|t| whole.corners(t as u32));
     assert!(whole.solid_part(1).of(0).eq(solid));
     for surfaces in [scene.surfaces, single.surfaces] {
