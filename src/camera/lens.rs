@@ -2,6 +2,8 @@
 //!
 //! Each has a near plane and a finite or (but for orthographic) infinite far plane.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
 use super::{
@@ -204,12 +206,14 @@ impl Lens {
 }
 
 /// The tangent of half an angle in degrees, true to some units of 2^-53 up to
-/// 180 degrees: near there what is missing is small, and its difference exact.
+/// 180 degrees: near there what is missing is small, and its difference exact. 1 at 90.
 fn slope(degrees: f64) -> f64 {
-    if degrees <= 90.0 {
-        libm::tan(degrees.to_radians() / 2.0)
-    } else {
-        1.0 / libm::tan((180.0 - degrees).to_radians() / 2.0)
+    let below = |degrees: f64| libm::tan(degrees.to_radians() / 2.0);
+    match degrees.total_cmp(&90.0) {
+        Ordering::Less => below(degrees),
+        // The tangent of the rounded angle is not.
+        Ordering::Equal => 1.0,
+        Ordering::Greater => 1.0 / below(180.0 - degrees),
     }
 }
 
@@ -287,6 +291,7 @@ mod tests {
         let off = slope(180.0 - missing) / true_slope - 1.0;
         assert!(off.abs() < 1e-15, "{off:e}");
         assert!((slope(120.0) / 3f64.sqrt() - 1.0).abs() < 4e-16);
+        assert_eq!(slope(90.0), 1.0);
     }
 
     /// Engines write the largest f32 for no far plane.

@@ -255,10 +255,7 @@ pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Bloc
     });
     let lens = lens.map(|lens| format!("{asked}; {} up; {lens}", up.join(" or ")));
     let cut = |label: &String| text::without_middle(&text::plain(label), [width / 4; 2]);
-    let labels = labels(all);
-    let names = distinct(&labels, cut, |label| {
-        about_difference(label, &labels, width / 2)
-    });
+    let names = distinct(&labels(all), cut, |label| text::plain(label));
     let mut parts = matrix(names, all, overall).parts(width);
     let hidden = parts.split_off(1);
     let hidden: usize = hidden.iter().map(|part| part.header.len() - 1).sum();
@@ -282,30 +279,41 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
 ///
-/// The full ones where two would be the same.
+/// Those of two scenes or paths differ.
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
-    let of = |key: &GroupKey, show: fn(&str) -> String| {
-        let names = [&key.scene, &key.path, &key.motion];
-        names.map(|name| show(name)).join(" ").trim_end().to_owned()
-    };
     let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
-    distinct(&keys, |key| of(key, short), |key| of(key, str::to_owned))
+    let shown = |of: fn(&GroupKey) -> &String| {
+        let names: Vec<String> = keys.iter().map(|key| of(key).clone()).collect();
+        distinct(
+            &names,
+            |name| short(name),
+            |name| about_difference(name, &names),
+        )
+    };
+    let [scenes, paths] = [shown(|key| &key.scene), shown(|key| &key.path)];
+    let parts = scenes.into_iter().zip(paths).zip(shown(|key| &key.motion));
+    let label = |((scene, path), motion)| format!("{scene} {path} {motion}");
+    parts
+        .map(|parts| label(parts).trim_end().to_owned())
+        .collect()
 }
 
-/// The beginning of a label, and the part where it first differs from the most similar other.
-fn about_difference(label: &str, all: &[String], room: usize) -> String {
+/// A name; of a long one the beginning, and the part from where the most similar other differs.
+fn about_difference(name: &str, all: &[String]) -> String {
+    const ROOM: usize = 32;
     let alike = |other: &String| {
-        let both = label.chars().zip(other.chars());
+        let both = name.chars().zip(other.chars());
         both.take_while(|(own, other)| own == other).count()
     };
-    let others = all.iter().filter(|other| *other != label);
-    let (head, same) = (room / 4, others.map(alike).max().unwrap_or(0));
-    let rest = label.chars().skip(same.saturating_sub(room / 4).max(head));
-    let head = text::shortened(label, head);
-    head + &text::without_middle(
-        &text::plain(&rest.collect::<String>()),
-        [room / 2, room / 8],
-    )
+    let others = all.iter().filter(|other| *other != name);
+    let same = others.map(alike).max().unwrap_or(0);
+    let start = same.saturating_sub(ROOM / 4);
+    let name = text::plain(name);
+    if name.chars().count() <= ROOM || start <= ROOM / 4 {
+        return text::shortened(&name, ROOM);
+    }
+    let rest: String = name.chars().skip(start).collect();
+    text::shortened(&name, ROOM / 4) + &text::without_middle(&rest, [ROOM / 2, ROOM / 8])
 }
 
 /// Short names; the full ones where two that differ have the same.
@@ -424,8 +432,32 @@ pub fn question(group: &GroupKey) -> String {
 /// Arithmetic, plane derivation and epsilon, where they are no defaults.
 pub fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
     let usual = GroupKey::of("", "", false, &Culling::default(), "");
-    let epsilon = |key: &GroupKey| format!("epsilon {}", key.epsilon);
+    // There is none in f64.
+    let epsilon = |key: &GroupKey| match key.arithmetic.as_str() {
+        "f64" => format!("epsilon {}", usual.epsilon),
+        _ => format!("epsilon {}", key.epsilon),
+    };
     let facts = |key: &GroupKey| [key.arithmetic.clone(), key.planes.clone(), epsilon(key)];
     let both = facts(group).into_iter().zip(facts(&usual));
     both.filter(|(own, usual)| own != usual).map(|(own, _)| own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_are_cut_where_they_differ() {
+        let own = |roofs: &str| format!("helsinki_city_centre_export_2024_{roofs}_roofs.csv");
+        let all = ["with", "without", "no"].map(own);
+        let cut = all.each_ref().map(|name| about_difference(name, &all));
+        assert_eq!(cut[0], "helsinki...024_with_roofs.csv");
+        assert_eq!(cut[1], "helsinki...024_without_roofs.csv");
+        assert_eq!(cut[2], "helsinki..._2024_no_roofs.csv");
+        let seeds = [
+            "city:n=300,seed=1".to_owned(),
+            "city:n=300,seed=2".to_owned(),
+        ];
+        assert_eq!(about_difference(&seeds[0], &seeds), seeds[0]);
+    }
 }

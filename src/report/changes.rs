@@ -28,9 +28,9 @@ const LEAST_PROCESSES: usize = 3;
 pub enum Basis {
     /// Two stored reports.
     ///
-    /// Per process, ln(time) of a structure minus the median of the other structures that
-    /// both reports have in the group (of an odd number, the structure itself with them if need
-    /// be), each about its mean in the old report; old and new by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
+    /// Per process, ln(time) of a structure minus the median of an odd number of the other
+    /// structures that both reports have in the group, each about its mean in the old report;
+    /// old and new by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
     Reports,
     /// Pairs of processes in turns: times as they are, by [`judge`].
     Pairs,
@@ -286,8 +286,8 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 /// ln(time) less what moved the median of the others, process by process;
 /// nothing with too few others.
 ///
-/// The structure itself counts among an even number of others: the median of four moves with
-/// two of them, that of five does not.
+/// Of an even number of others the one that moved farthest from the median of all does not
+/// count: the median of four moves with two of them, that of three moves with none.
 fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {
@@ -298,7 +298,14 @@ fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     if others.len() < LEAST_OTHERS {
         return Logs::default();
     }
-    others.extend(others.len().is_multiple_of(2).then_some(&centred[own]));
+    if others.len().is_multiple_of(2) {
+        let moved = |logs: &Logs| median(&logs[1]).unwrap_or_default();
+        let all = others.iter().copied().chain([&centred[own]]);
+        let middle = median(&all.map(moved).collect::<Vec<_>>()).unwrap_or_default();
+        let far = |logs: &Logs| (moved(logs) - middle).abs();
+        others.sort_by(|a, b| far(a).total_cmp(&far(b)));
+        others.pop();
+    }
     let side = |side: usize| -> Vec<f64> {
         let relative = logs[side].iter().enumerate().filter_map(|(process, ln)| {
             let others: Vec<f64> = others.iter().map(|o| o[side][process]).collect();

@@ -224,6 +224,8 @@ fn one_process_and_few_structures_are_inconclusive() {
             "no '{wanted}' in:\n{text}"
         );
     }
+    let found = works(one.path(), "compare old.json new.json --format json");
+    assert_eq!(json(&found)["verdict"], "nothing_was_decided");
     let few = with_change(|new| {
         scale(bvh(new), "query_ns", 3.0);
         cells(new).retain(|cell| cell["structure"] == "bvh" || cell["structure"] == "linear");

@@ -3,6 +3,7 @@
 //! wrong at camera level though all structures agree about them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
@@ -126,6 +127,28 @@ fn choices_that_do_not_go_together_are_refused() {
         format!("run --out r {scene} --test sphere,exact,sphere"),
     ];
     all_refused(&here, &twice, "is named twice");
+}
+
+/// What is no default stands in the heads: the same structures take other times.
+#[test]
+fn the_head_of_a_run_names_its_arithmetic_and_planes() {
+    let here = folder(&[]);
+    let run = "run --path orbit:frames=2 --structure linear --processes 1 --no-bounds";
+    let one = format!("{run} --scene city:n=50 --planes gh-gl-f32 --epsilon 0 --out r");
+    let told = works(here.path(), &one);
+    assert!(
+        told.contains("2 views, six-plane, gh-gl-f32, epsilon 0\n"),
+        "{told}"
+    );
+    let told = works(here.path(), "report r --markdown r.md");
+    let markdown = fs::read_to_string(here.path().join("r.md")).expect(&told);
+    assert!(
+        markdown.contains("warm, six-plane, gh-gl-f32, epsilon 0\n"),
+        "{markdown}"
+    );
+    let two = format!("{run} --scene city:n=50 --scene city:n=60 --arithmetic f64 --out s");
+    let told = works(here.path(), &two);
+    assert!(told.contains("six-plane, f64; z up; "), "{told}");
 }
 
 #[test]

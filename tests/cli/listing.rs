@@ -270,9 +270,12 @@ fn fetched_files_that_are_missing_or_damaged_are_told_and_recorded() {
     let left_out = &json(&read("report.json"))["run"]["left_out"];
     let left_out = left_out.as_str().expect("a line");
     assert!(left_out.contains(": freedm freedoom2 engine cities "));
-    assert!(
-        out.contains("warning: left out, as missing or damaged"),
-        "{out}"
-    );
+    let part = format!("run --suite real {short}/part --shard 1/1");
+    assert_eq!(cullbench(folder.path(), &part).code, Some(0));
+    let merged = works(folder.path(), "merge r/part --out merged");
+    for out in [out, merged] {
+        let told = "warning: left out, as missing or damaged";
+        assert!(out.contains(told) && out.contains(" 0 wrong;"), "{out}");
+    }
     assert!(read("report.html").contains(left_out));
 }

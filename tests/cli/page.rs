@@ -202,7 +202,7 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     // What tells two sections apart is in their headings.
     for cell in new["cells"].as_array_mut().expect("an array") {
         let own = &mut cell["path"];
-        (own["motion"], own["arithmetic"]) = (json!("drift"), json!("f64"));
+        (own["motion"], own["arithmetic"]) = (json!("drift"), json!("f32-relative"));
         own["epsilon"] = json!(64);
         cell["metrics"]["frame_ns"] = cell["metrics"]["query_ns"].clone();
     }
@@ -214,7 +214,7 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
         page.contains(&format!("{heading}: time per query in each run")),
         "{page}"
     );
-    let moving = format!("{heading}, drift, f64, epsilon 64: time per frame in each run");
+    let moving = format!("{heading}, drift, f32-relative, epsilon 64: time per frame in each run");
     assert!(page.contains(&moving), "{page}");
     let wanted = "2 reports; expected one, or --history FILE";
     all_refused(&folder, &["report old new.json".to_owned()], wanted);

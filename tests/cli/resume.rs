@@ -233,6 +233,17 @@ fn only_the_recorded_run_goes_on() {
         all_refused(&folder, &["run --resume --out r"], wanted);
         fs::write(run.join("stream.jsonl"), &kept).expect("writable");
     }
+    // From another folder the suite is not there, and has not changed.
+    let suite = "[[scenes]]\nscene = \"city:n=50\"\npaths = [\"orbit:frames=2\"]\n";
+    fs::write(folder.path().join("s.toml"), suite).expect("writable");
+    works(
+        folder.path(),
+        "run --suite s.toml --structure linear --processes 2 --out s",
+    );
+    cut(&folder.path().join("s"), 1);
+    let elsewhere = folder.path().join("r");
+    let missing = cullbench(&elsewhere, "run --resume --out ../s");
+    assert_refused(&missing, "s.toml: No such file | expected", "elsewhere");
     all_refused(
         &folder,
         &["run --resume --out nothing"],

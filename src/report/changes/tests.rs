@@ -89,9 +89,9 @@ fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
 /// The others of one that stood still are four, half of which have moved.
 #[test]
 fn two_structures_of_five_that_moved_are_found() {
-    let (old, mut new) = (all(10, 1.0), all(10, 1.0));
+    let (old, mut new) = (all(10, 1.0), all(10, 1.5));
     for moved in [1, 3] {
-        new.cells[moved] = timed(NAMES[moved], LEVELS[moved] * 1.3, 10, 1.0);
+        new.cells[moved] = timed(NAMES[moved], LEVELS[moved] * 1.3, 10, 1.5);
     }
     let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
     let counts = [Outcome::Slower, Outcome::Same].map(|outcome| found.count(outcome));
