@@ -117,12 +117,17 @@ def short(scene):
     return name + short.get(count, "")
 
 
+def is_shown(scene):
+    """The city has the fastest structures of `uniform` in nearly all rows, and is left out."""
+    return not scene.startswith("city")
+
+
 def groups(step):
     """Motion, scene and the cells by structure, in the order of the step."""
     scenes, motions, frames = STEPS[step][:3]
     own = [cell for cell in cells() if cell["step"] == step]
     for motion in motions:
-        for scene in scenes:
+        for scene in filter(is_shown, scenes):
             here = {c["structure"]: c for c in own if c["status"] == "ok"
                     and c["motion"] == f"{motion},frames={frames}" and c["scene"] == scene}
             if here:
@@ -151,16 +156,18 @@ def frames(step):
                  for name, text in zip(OURS, shown)]
         peer = best(here, ALL)
         name = peer["structure"].removeprefix("peer-")
-        last = ([worst(here[name]) for name in ["wide", "moving"]] if step == "million" else
-                [ratio(here[name], "ageing_100") for name in ["wide", "moving"]])
-        yield row(motion, scene, *shown, f"{name} {us(peer)}", number(least / time_of(peer)), *last)
+        # Queries age as with one view, so the table of views leaves that out.
+        last = {"million": worst, "views": None}.get(step, lambda c: ratio(c, "ageing_100"))
+        shown += [f"{name} {us(peer)}"]
+        yield row(motion, scene, *shown, *[last(here[n]) for n in ["wide", "moving"] if last])
 
 
 def updates():
-    """Frame and worst frame by policy, and from how many views on a rebuild pays."""
+    """Frame and worst frame by policy (a rebuild in each takes about the same), and from how many views on a rebuild pays."""
     for motion, scene, here in groups("updates"):
-        names = ["wide", "wide@every=20", "wide@rebuild"]
+        names = ["wide", "wide@every=20"]
         shown = [f"{us(here[name])} ({us(here[name], 'worst_frame_ns')})" for name in names]
+        shown += [us(here["wide@rebuild"])]
         refit, rebuild = here["wide"], here["wide@rebuild"]
         update = [float(c["update_ns"]) for c in (rebuild, refit)]
         query = [float(c["query_ns"]) for c in (refit, rebuild)]
@@ -193,30 +200,35 @@ HEAD = """## What moves
 
 Written by `scripts/motion.py` from [results/motion](../results/motion) ({cpu}, {date}; one
 core of a shared machine, views of 2 %, three processes). *Others*: other items move in every frame.
-Helsinki has 11,065 boxes. Least times within 5 % are bold.
+Helsinki has 11,065 boxes. Least times within 5 % are bold. The rows of the city are left out: in
+18 of 20 it has a fastest structure in common with `uniform` (the other two: `auto`), frames of
+`linear` and `wide` take 0.7 to 1.3 times as long, of `moving` 0.7 to 2.7 times, and `wide` ages up
+to 2.4 times as much.
 
 ### Frame by structure
 
-us of a frame with one view, mean of 100 frames; *peer*: the fastest by its own calls, of obvhs
-and parry3d, where items come and go of all; *best / peer*: our best frame / that; *ageing*: query
-time after 100 frames / on a fresh build.
+Time of a frame with one view in us, mean of 100 frames. *Peer*: the faster of obvhs and parry3d, by
+its own update calls (`spawn`: the fastest of all peers). *Ageing*: query time after 100 frames /
+on a fresh build.
 
 """
 
 
 def section(about):
-    head = "moved per frame | scene | linear | wide | moving | auto | peer | best / peer"
+    head = "moved per frame | scene | linear | wide | moving | auto | peer"
     yield HEAD.format(**about)
     yield table(f"{head} | ageing of wide | of moving", [*frames("frames"), *frames("spawn")])
     yield "\nA million items, 30 frames; *worst*: the slowest frame / the mean:\n\n"
     yield table(f"{head} | worst of wide | of moving", frames("million"))
-    yield "\nSixteen views a frame; *peer*: obvhs:\n\n"
-    yield table(f"{head} | ageing of wide | of moving", frames("views"))
-    yield "\nOther peers, us of a frame with one view ([PEERS](PEERS.md)):\n\n"
+    yield ("\nSixteen views per frame; *peer*: obvhs. Queries age as with one view (within 15 %):"
+           "\n\n")
+    yield table(head, frames("views"))
+    yield "\nOther peers, time of a frame with one view in us ([PEERS](PEERS.md)):\n\n"
     yield table("moved per frame | scene | wide | obvhs | parry3d | bvh | rstar | Bevy-style",
                 peers())
     yield ("\n### Refit or rebuild\n\nFrame of `wide` in us (worst frame), one view, mean of 40 "
-           "frames; *views*: the\nqueries per frame from which on a rebuild in every frame pays.\n\n")
+           "frames. *Views*: the number of\nqueries per frame from which on a rebuild in every "
+           "frame pays.\n\n")
     yield table("moved per frame | scene | refit | every=20 | rebuild | views", updates())
     yield ("\n### After 1,000 frames\n\nFrame in us; ageing after 100 and 1,000 frames; worst frame "
            "/ mean.\n\n")
