@@ -63,7 +63,7 @@ def times_of(samples, task="query"):
 
 
 def over_processes(times):
-    """The time of each cell in ns, by the estimator of report.json (docs/METHODOLOGY.md, "Processes").
+    """The time of each cell in ns, by the estimator of report.json (docs/METHODOLOGY.md, "Estimates").
 
     The 20 % trimmed mean of the logarithms of linear, and of the differences to it in each process;
     without linear the first by name stands for it (in the report the first that was entered).
