@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 """Writes docs/WORLDS.md from results/worlds: the real scenes and what is fastest in them.
 
-usage: scripts/worlds.py [CULLBENCH]
+usage: scripts/worlds.py [CULLBENCH [info]]
 
 With an optimised CULLBENCH the suite `real` is measured first (a few minutes; run
-scripts/fetch.py before) and stored in results/worlds.
+scripts/fetch.py before) and stored in results/worlds; with `info` only what `scene info` says of
+the scenes is.
 """
 
 import csv
 import gzip
 import json
-import math
 import shutil
 import subprocess
 import sys
@@ -35,13 +35,13 @@ PATHS = ["--path", "flythrough:frames=128", "--path", "outside:frames=64"]
 RUNS = {"real": ["--suite", "real"],
         "triangles": ["--scene", f"{FOLDER}sponza.obj", "--scene", f"{FOLDER}kitchen.obj", *PATHS]}
 TRIANGLES = ["--items", "triangles"]
-KEYS = ["total_count", "region_count", "bounds_min", "bounds_max", "origin", "size_min", "size_max",
-        "unit"]
+KEYS = ["total_count", "region_count", "extent", "size_min", "size_max", "unit", "f32_loss"]
+# Units of files that state none.
+UNITS = {f"{FOLDER}cities.csv": "degrees", f"{FOLDER}stars.csv": "parsecs"}
 
 
 def measure():
     RESULTS.mkdir(exist_ok=True)
-    scenes = {}
     for run, arguments in RUNS.items():
         more = TRIANGLES if run == "triangles" else []
         with tempfile.TemporaryDirectory() as folder:
@@ -51,8 +51,23 @@ def measure():
             with open(out / "report.json", "rb") as report, \
                     gzip.GzipFile(RESULTS / f"{run}.json.gz", "wb", mtime=0) as packed:
                 shutil.copyfileobj(report, packed)
+
+
+def report_of(run):
+    with gzip.open(RESULTS / f"{run}.json.gz") as packed:
+        return json.load(packed)
+
+
+def describe():
+    """Stores what `scene info` says of the scenes that were measured, and of no others."""
+    scenes = {}
+    for run in RUNS:
+        more = TRIANGLES if run == "triangles" else []
+        digests = {cell["scene"]["name"]: cell["scene"]["digest"] for cell in report_of(run)["cells"]}
         for name in dict.fromkeys(row["scene"] for row in rows(run)):
             info = json.loads(cullbench("scene", "info", name, "--format", "json", *more))
+            if info["digest"] != digests[name]:
+                sys.exit(f"worlds.py: {name} is not the scene of {run}.json.gz; expected its digest")
             scenes.setdefault(run, {})[name] = {key: info[key] for key in KEYS}
     (RESULTS / "scenes.json").write_text(json.dumps(scenes, indent=1) + "\n")
 
@@ -72,11 +87,10 @@ def time(ns):
     return f"{ns:.0f} ns" if ns < 1000 else f"{ns / 1000:.3g} us"
 
 
-def step(info):
-    """Spacing of f32 at the scene's farthest coordinate."""
-    reach = max(abs(v - o) for bound in ["bounds_min", "bounds_max"]
-                for v, o in zip(info[bound], info["origin"]))
-    return 2.0 ** (math.floor(math.log2(reach)) - 23) if reach else 0.0
+def loss(info):
+    """Most that bounds move when they are rounded to f32."""
+    most = max(info["f32_loss"])
+    return f"{most:.1e}".replace("e-0", "e-") if most else "0"
 
 
 def best(cells, metric):
@@ -101,18 +115,19 @@ def table(run, scenes):
     lines = []
     for name, info in scenes.items():
         own = [c for c in cells if c["scene"] == name]
-        extent = [b - a for a, b in zip(info["bounds_min"], info["bounds_max"])]
+        unit = info["unit"] or UNITS.get(name)
+        extent = " x ".join(number(e) for e in info["extent"]) + (f" {unit}" if unit else "")
         shown = [name.replace(FOLDER, "") + (", triangles" if run == "triangles" else ""),
-                 f"{info['total_count']:,}", " x ".join(number(e) for e in extent),
-                 size_ratio(info), f"{step(info):.1e}"]
+                 f"{info['total_count']:,}", extent, size_ratio(info), loss(info)]
         for path in list(dict.fromkeys(c["path"] for c in own))[:2]:
             here = [c for c in own if c["path"] == path and c["cache"] == "warm"]
             linear = next(c for c in here if c["structure"] == "linear")
             first, label = fastest(here)
             ratio = float(linear["query_ns"]) / float(first["query_ns"])
             culled = 100 * float(linear["cull_rate"])
-            shown.append(f"{path.split(':')[0]}, {culled:.0f} % culled: {label} "
-                         f"{time(float(first['query_ns']))}, {ratio:.3g} x")
+            name_of = path.split(":")[0] + ("" if path.startswith("outside") else
+                                            f", {culled:.0f} % culled")
+            shown.append(f"{name_of}: {label} {time(float(first['query_ns']))}, {ratio:.3g} x")
         inside = own[0]["path"]
         found = best([c for c in own if c["path"] == inside], "locate_ns")
         shown.append(f"{info['region_count']:,}: {found['structure']} "
@@ -123,27 +138,28 @@ def table(run, scenes):
 
 HEAD = """# Real worlds
 
-Written by `scripts/worlds.py` from [results/worlds](../results/worlds) (`run --suite real`, {cpu},
-{date}, {processes} processes). Fetch the scenes with `scripts/fetch.py`; licences are in
-[datasets](../datasets/README.md) and `scripts/fetch.py --list`.
+Written by `scripts/worlds.py` from [results/worlds](../results/worlds) (`run --suite real`,
+{cpu}, {date}, {processes} processes). Fetch the scenes with `scripts/fetch.py`; licences are
+in [datasets](../datasets/README.md) and `scripts/fetch.py --list`.
 
-*Sizes*: shortest to longest, of the items' longest edges. *f32 step*: spacing of f32 at the
-farthest coordinate, in the scene's unit. For two paths: share of items outside of the view, the
-fastest structure (`wide` where it ties for it), its time per query, and its speed-up over the SIMD
-scan `linear`. *Regions*: their number, and the structure that finds that of the eye first along the
-first path.
+*Sizes*: shortest to longest, of the items' longest edges. *f32 loss*: how far f32 moves a bound
+outward at most, in the unit of the extent (the unit of an OBJ is not known). For two paths: share of
+items outside of the view (none along `outside`), the fastest structure (`wide` where it ties for
+it), its time per query, and its speed-up over the SIMD scan `linear`. *Regions*: their number, and
+the structure that finds that of the eye in the least time along the first path.
 
-| scene | items | extent | sizes | f32 step | first path | second path | regions |
+| scene | items | extent | sizes | f32 loss | first path | second path | regions |
 |---|---|---|---|---|---|---|---|
 """
 
 
 def main():
     if len(sys.argv) > 1:
-        measure()
+        if sys.argv[2:] != ["info"]:
+            measure()
+        describe()
     scenes = json.loads((RESULTS / "scenes.json").read_text())
-    with gzip.open(RESULTS / "real.json.gz") as packed:
-        report = json.load(packed)
+    report = report_of("real")
     head = HEAD.format(cpu=report["machine"]["cpu"], date=report["run"]["started_at"][:10],
                        processes=report["cells"][0]["times"]["processes"])
     notes = PAGE.read_text().partition("\n## ")[2] if PAGE.exists() else "What surprised\n"
