@@ -110,6 +110,16 @@ def size_ratio(info):
     return "points" if not high else f"1 : {number(high / low)}" if low else "from 0"
 
 
+def along(path, cells):
+    """A path, its share of culled items and the fastest structure."""
+    here = [c for c in cells if c["path"] == path and c["cache"] == "warm"]
+    linear = next(c for c in here if c["structure"] == "linear")
+    first, label = fastest(here)
+    ratio = float(linear["query_ns"]) / float(first["query_ns"])
+    return (f"{path.split(':')[0]}, {100 * float(linear['cull_rate']):.0f} % culled: {label} "
+            f"{time(float(first['query_ns']))}, {ratio:.3g} x")
+
+
 def table(run, scenes):
     cells = rows(run)
     lines = []
@@ -119,15 +129,8 @@ def table(run, scenes):
         extent = " x ".join(number(e) for e in info["extent"]) + (f" {unit}" if unit else "")
         shown = [name.replace(FOLDER, "") + (", triangles" if run == "triangles" else ""),
                  f"{info['total_count']:,}", extent, size_ratio(info), loss(info)]
-        for path in list(dict.fromkeys(c["path"] for c in own))[:2]:
-            here = [c for c in own if c["path"] == path and c["cache"] == "warm"]
-            linear = next(c for c in here if c["structure"] == "linear")
-            first, label = fastest(here)
-            ratio = float(linear["query_ns"]) / float(first["query_ns"])
-            culled = 100 * float(linear["cull_rate"])
-            name_of = path.split(":")[0] + ("" if path.startswith("outside") else
-                                            f", {culled:.0f} % culled")
-            shown.append(f"{name_of}: {label} {time(float(first['query_ns']))}, {ratio:.3g} x")
+        shown.append("; ".join(along(path, own) for path in dict.fromkeys(c["path"] for c in own)
+                               if not path.startswith("outside")))
         inside = own[0]["path"]
         found = best([c for c in own if c["path"] == inside], "locate_ns")
         shown.append(f"{info['region_count']:,}: {found['structure']} "
@@ -143,13 +146,14 @@ Written by `scripts/worlds.py` from [results/worlds](../results/worlds) (`run --
 in [datasets](../datasets/README.md) and `scripts/fetch.py --list`.
 
 *Sizes*: shortest to longest, of the items' longest edges. *f32 loss*: how far f32 moves a bound
-outward at most, in the unit of the extent (the unit of an OBJ is not known). For two paths: share of
-items outside of the view (none along `outside`), the fastest structure (`wide` where it ties for
-it), its time per query, and its speed-up over the SIMD scan `linear`. *Regions*: their number, and
-the structure that finds that of the eye in the least time along the first path.
+outward at most, in the unit of the extent (the unit of an OBJ is not known). *Paths*: share of
+items outside of the view (98 % where the far plane is set for 2 % visible), the fastest structure
+(`wide` where it ties for it; *tied*: how many share the rank), its time per query, and its speed-up
+over the SIMD scan `linear`. *Regions*: their number, and the structure that finds that of the eye
+in the least time along the first path.
 
-| scene | items | extent | sizes | f32 loss | first path | second path | regions |
-|---|---|---|---|---|---|---|---|
+| scene | items | extent | sizes | f32 loss | paths | regions |
+|---|---|---|---|---|---|---|
 """
 
 
