@@ -313,7 +313,7 @@ fn about_difference(name: &str, all: &[String]) -> String {
         return text::shortened(&name, ROOM);
     }
     let rest: String = name.chars().skip(start).collect();
-    text::shortened(&name, ROOM / 4) + &text::without_middle(&rest, [ROOM / 2, ROOM / 8])
+    text::shortened(&name, ROOM / 4) + &text::without_middle(&rest, [ROOM / 2, ROOM / 4])
 }
 
 /// Short names; the full ones where two that differ have the same.
