@@ -453,7 +453,7 @@ mod tests {
         let cut = all.each_ref().map(|name| about_difference(name, &all));
         assert_eq!(cut[0], "helsinki...024_with_roofs.csv");
         assert_eq!(cut[1], "helsinki...024_without_roofs.csv");
-        assert_eq!(cut[2], "helsinki..._2024_no_roofs.csv");
+        assert_eq!(cut[2], "helsinki...rt_2024_no_roofs.csv");
         let seeds = [
             "city:n=300,seed=1".to_owned(),
             "city:n=300,seed=2".to_owned(),
