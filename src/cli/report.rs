@@ -244,7 +244,7 @@ fn about(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Shows the basis of a run, its warnings, the next command, its files and another file.
+/// Shows the basis of a run, warnings, the next command, and the files written.
 ///
 /// `how` is behind the number of cells: how long they took, or whence they are.
 pub fn close(

@@ -298,7 +298,9 @@ pub fn labels(all: &[&Comparison]) -> Vec<String> {
         .collect()
 }
 
-/// A name; of a long one the beginning, and the part from where the most similar other differs.
+/// A name; if it is long, its beginning and the part that differs.
+///
+/// The part begins where the most similar other name differs.
 fn about_difference(name: &str, all: &[String]) -> String {
     const ROOM: usize = 32;
     let alike = |other: &String| {

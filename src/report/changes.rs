@@ -286,8 +286,8 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 /// ln(time) less what moved the median of the others, process by process;
 /// nothing with too few others.
 ///
-/// Of an even number of others the one that moved farthest from the median of all does not
-/// count: the median of four moves with two of them, that of three moves with none.
+/// If the others are even in number, the one that moved farthest from the median of all does
+/// not count: the median of four moves with two of them, that of three moves with none.
 fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {

@@ -92,10 +92,9 @@ impl Surfaces {
         all
     }
 
-    /// The opaque triangles of an item, as the only item, if they are closed; if not, the
-    /// one-sided ones of them.
+    /// The opaque triangles of an item, as the only item.
     ///
-    /// Points of one place are one point: files have several, for each normal one.
+    /// The one-sided of them where all of them are not closed. Points of one place are one point: files have several, for each normal one.
     ///
     /// # Panics
     /// If there is no such item.
@@ -248,9 +247,10 @@ impl Surfaces {
         })
     }
 
-    /// Number of edges of an item that are not gone along as often one way as the other:
-    /// zero for closed surfaces whose triangles are wound alike. Edges are told apart by
-    /// their indices. O(t log t).
+    /// Number of open edges of an item.
+    ///
+    /// They are not gone along as often one way as the other: zero for closed surfaces whose
+    /// triangles are wound alike. Edges are told apart by their indices. O(t log t).
     pub fn open_edges(&self, item: usize) -> usize {
         let triangles = self.triangles[self.range(item)].iter();
         let edges = triangles.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
@@ -397,8 +397,7 @@ mod tests {
         }
     }
 
-    /// As exporters write a cube: corners once per face, seen from both sides, and a triangle
-    /// without area at an edge.
+    /// A cube of exporters: corners once per face, and a triangle without area.
     #[test]
     fn a_body_of_several_points_per_place_is_closed() {
         let unit = Aabb::new(Vec3::ZERO, Vec3::ONE);

@@ -129,7 +129,7 @@ fn choices_that_do_not_go_together_are_refused() {
     all_refused(&here, &twice, "is named twice");
 }
 
-/// What is no default stands in the heads: the same structures take other times.
+/// The same structures take other times by them.
 #[test]
 fn the_head_of_a_run_names_its_arithmetic_and_planes() {
     let here = folder(&[]);
