@@ -124,6 +124,14 @@ KEYS = """(async () => {
     if (!now().startsWith(`view ${at} of`)) faults.push(`after ${key}: "${now()}"`);
     if (location.hash.includes("NaN")) faults.push(`after ${key}: ${location.hash}`);
   }
+  for (const [key, name] of [["b", "boxes"], ["n", "nodes"]]) {
+    press(key);
+    await drawn();
+    const { hidden } = document.getElementById(name);
+    if (location.hash.includes(`${name}=1`) === hidden) faults.push(`after ${key}: ${location.hash}`);
+    if (name === "nodes" && !hidden && !/: [1-9]/.test(document.getElementById("visited").textContent)) faults.push("no nodes");
+    press(key);
+  }
   return faults;
 })()"""
 

@@ -5,9 +5,9 @@
 use std::io::{self, Write};
 
 use anyhow::{Context, ensure};
-use glam::{DMat4, DVec3, DVec4, I64Vec3};
+use glam::{DMat4, DVec3, DVec4, I64Vec3, Vec3};
 use obvhs::ploc::morton::morton_encode_u64;
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::command_args::ViewArgs;
 use super::document::page;
@@ -16,20 +16,24 @@ use super::study::progress;
 use super::text::{self, html};
 use super::{Ending, expect_places, load_scene, program, scene_facts, unread_is_fine, write_text};
 use crate::camera::{Camera, ClipSpace};
+use crate::culling::CameraView;
 use crate::funnel::{RaysEnd, Shape};
-use crate::index::Registry;
+use crate::geometry::Aabb;
+use crate::index::{Registry, TreeCell, verdicts};
 use crate::input::{note, tell_warnings};
-use crate::measure::{SceneInfo, Workload};
+use crate::measure::{SceneInfo, Workload, input_of};
 use crate::oracle::Verdict;
 use crate::path::{self, CameraFacts};
-use crate::query::{ItemId, QueryCost};
+use crate::query::ItemId;
 use crate::report::grouped;
-use crate::scene::Scene;
+use crate::scene::{Scene, Surfaces};
 use crate::verify::Truth;
 use crate::visibility::Rays;
 
 /// Most items that a browser is given to draw.
 const MOST_ITEMS: usize = 2_000_000;
+/// Most triangles; of more the boxes of the items are drawn.
+const MOST_TRIANGLES: usize = 300_000;
 
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let out = Some(args.out.clone());
@@ -39,11 +43,10 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let culling = args.culling.culling(&args.test)?;
     let scene = load_scene(&args.scene, &args.culling.lens.scene_args.options(1))?;
     let items = scene.items.len();
-    let (found, most) = (text::count(items), text::count(MOST_ITEMS));
+    let (name, found, most) = (&scene.name, text::count(items), text::count(MOST_ITEMS));
     ensure!(
         items <= MOST_ITEMS,
-        "{}: {found} items; expected at most {most} to draw",
-        scene.name
+        "{name}: {found} items; expected at most {most} to draw"
     );
     let cameras = path::load(&args.path, &scene, &defaults)?;
     let (all, most) = (cameras.cameras.len(), args.frames);
@@ -51,14 +54,19 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let workload = Workload::new(&scene, &cameras, &culling)?;
     tell_warnings();
     culling.unproven().iter().for_each(|doubt| note(doubt));
-    let (mut data, order) = ViewData::of(&scene, &cameras.name);
+    let surfaces = scene.surfaces.as_ref();
+    let triangles = surfaces.map_or(0, |all| all.triangles.len());
+    let drawn = surfaces.filter(|_| triangles <= MOST_TRIANGLES);
+    let grid = Grid::of(&scene, drawn.map_or(0, |_| triangles));
+    let order = grid.order(&scene.items);
     let (mut answers, mut costs) = (Vec::<Box<[ItemId]>>::new(), Vec::new());
     let (ask, boxes, views) = (frustum(&workload), &workload.items, workload.views.len());
     let bar = progress((views * (structures.len() + 1)) as u64, " views");
     let mut each = |rows: Vec<Row>| {
         bar.inc(rows.len() as u64);
         for row in rows {
-            costs.push((row.structure, row.cost));
+            let tested = [row.cost.nodes_tested, row.cost.items_tested];
+            costs.push((row.structure, tested));
             if answers.len() == row.question {
                 answers.extend(row.ids);
             }
@@ -67,21 +75,23 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     };
     let questions = ("camera", views);
     let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
-    let costs = grouped(costs.into_iter()).into_iter();
-    let counters = |(name, costs): (String, Vec<QueryCost>)| Counters {
-        name,
-        nodes_tested: costs.iter().map(|cost| cost.nodes_tested).collect(),
-        items_tested: costs.iter().map(|cost| cost.items_tested).collect(),
-    };
-    data.structures = costs.map(counters).collect();
+    let costs = grouped(costs.into_iter());
+    // Of the first structure that has some.
+    let nodes = structures.iter().find_map(|spec| {
+        let index = spec.build(input_of(&scene, boxes)).ok()?;
+        let cells = index.cells();
+        cells.first()?;
+        Some((&spec.label, grid.nodes(&cells, &workload.views)))
+    });
     let threads = args.culling.kernel.execution()?.threads;
-    let samples = args.samples;
-    let surfaces = samples.map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
+    let ends = args
+        .samples
+        .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
     let downward = path::is_downward(&cameras.cameras, scene.up);
-    let mut totals = [0; FATES];
+    let (mut totals, mut frames) = ([0; KINDS], Vec::new());
     for (view, answer) in answers.iter().enumerate() {
         let camera = &cameras.cameras[view];
-        let front = surfaces.as_ref().map(|(ends, grid)| {
+        let front = ends.as_ref().map(|(ends, grid)| {
             let rays = Rays::of(camera)?;
             let truth = ends.visible(&rays, *grid, threads);
             Ok(truth.map_err(anyhow::Error::msg)?.visible)
@@ -91,20 +101,28 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
         let truth = Truth::of_scene(camera, &scene);
         let fates = fates(items, answer, truth.as_ref(), front.as_deref());
         fates.iter().for_each(|fate| totals[*fate as usize] += 1);
-        let set = |fate: Fate| runs(order.iter().map(|&id| fates[id as usize] == fate));
-        data.frames.push(Frame {
-            camera: if all > most { view * all / most } else { view },
-            clip: clip_matrix(camera, scene.origin, downward).to_cols_array(),
-            visible: set(Fate::Visible),
-            false_positive: set(Fate::FalsePositive),
-            hidden: set(Fate::Hidden),
-            lost: set(Fate::Lost),
-        });
+        let kinds: Vec<u8> = order.iter().map(|&id| fates[id as usize] as u8).collect();
+        frames.push(json!({
+            "camera": if all > most { view * all / most } else { view },
+            "clip": clip_matrix(camera, scene.origin, downward).to_cols_array(),
+            "fates": runs(&kinds),
+        }));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    data.samples = samples.map(|grid| format!("{}x{}", grid.width, grid.height));
-    let told = conclusion(&data, totals, agree);
+    let samples = args
+        .samples
+        .map(|grid| format!("{}x{}", grid.width, grid.height));
+    let count = costs.len();
+    let structures = match (costs.as_slice(), agree) {
+        ([(one, _)], _) => format!("The structure is {one}."),
+        (_, true) => format!("All {count} structures return the same sets."),
+        (_, false) => format!("The {count} structures disagree; the sets are the first one's."),
+    };
+    let means = totals.map(|count: usize| count as f64 / views as f64);
+    let found = conclusion(means, samples.as_deref());
+    let (path, seen) = (&cameras.name, text::counted(views, "view"));
+    let told = format!("{seen} of {path}: {found}. {structures}");
     let facts = CameraFacts::of(&cameras.cameras, scene.up);
     let axes = scene_facts::axes(&SceneInfo::of(&scene));
     let lens = scene_facts::lens(&facts);
@@ -114,13 +132,34 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let test = culling.test.name();
     let items = text::items(scene.items.len(), scene.skipped_items);
     let about = format!("Scene: {items}, {axes}. Lens: {lens}{matrix}. Test: {test}.");
-    let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
-    let title = format!("{} view {}", program::name(), data.scene);
+    let mut ids = Packed::default();
+    (order.iter()).for_each(|&item| ids.push(scene.row_of(item).into()));
+    let data = json!({
+        "scene": scene.name,
+        "path": path,
+        "items": scene.items.len(),
+        "up": scene.up.name(),
+        "steps": grid.steps,
+        "low": grid.low.to_array(),
+        "extent": grid.extent.to_array(),
+        "origin": scene.origin.to_array(),
+        "ids": ids.0,
+        "boxes": grid.boxes(order.iter().map(|&item| &scene.items[item as usize])),
+        "triangles": triangles,
+        "most_triangles": MOST_TRIANGLES,
+        "mesh": drawn.map(|all| grid.mesh(all, &order)),
+        "nodes": nodes,
+        "samples": samples,
+        "frames": frames,
+        "structures": costs,
+    });
+    let json = data.to_string().replace('<', "\\u003c");
+    let title = format!("{} view {}", program::name(), scene.name);
     let body = format!(
         "<main class=\"view\"><h1>{}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
          <script type=\"application/json\" id=\"data\">{json}</script>\n",
         html(&title),
-        html(&data.path),
+        html(path),
         html(&told),
         include_str!("assets/view.html"),
         html(&about),
@@ -167,39 +206,54 @@ fn fates(
     (0..items).map(fate).collect()
 }
 
-/// The result in sentences.
-fn conclusion(data: &ViewData, totals: [usize; FATES], agree: bool) -> String {
-    let views = data.frames.len();
-    let of = |fate: Fate| totals[fate as usize];
-    let mean = |count: usize| text::significant(count as f64 / views as f64);
-    let returned = of(Fate::Visible) + of(Fate::FalsePositive) + of(Fate::Hidden);
-    let mut parts = vec![match of(Fate::FalsePositive) {
-        0 => "no false positive".to_owned(),
-        count => format!("{} false positives per view", mean(count)),
-    }];
-    if let Some(samples) = &data.samples {
-        let hidden = mean(of(Fate::Hidden));
-        parts.push(format!(
-            "{hidden} hidden (in front at none of {samples} samples)"
-        ));
-    }
-    parts.push(match of(Fate::Lost) {
-        0 => "no visible item lost".to_owned(),
-        count => format!("{} visible items lost", mean(count)),
-    });
-    let count = data.structures.len();
-    let structures = match (data.structures.as_slice(), agree) {
-        ([one], _) => format!("The structure is {}.", one.name),
-        (_, true) => format!("All {count} structures return the same sets."),
-        (_, false) => format!("The {count} structures disagree; the sets are the first one's."),
+/// The result in words.
+fn conclusion(means: [f64; KINDS], samples: Option<&str>) -> String {
+    let of = |fate: Fate| means[fate as usize];
+    let items = text::count(means.iter().sum::<f64>().round() as usize);
+    let told = |fate: Fate, none: &str, some: &str| match of(fate) {
+        0.0 => none.to_owned(),
+        mean => format!("{} {some}", text::significant(mean)),
     };
-    let (parts, returned) = (parts.join(", "), mean(returned));
-    let (views, items) = (text::counted(views, "view"), text::count(data.items));
-    let path = &data.path;
-    format!(
-        "{views} of {path}: {returned} of {items} items returned per view, {parts}. {structures}"
-    )
+    let (none, some) = ("no false positive", "false positives per view");
+    let extra = told(Fate::FalsePositive, none, some);
+    let hidden = text::some(samples, |samples| {
+        let hidden = text::significant(of(Fate::Hidden));
+        format!("{hidden} hidden (in front at none of {samples} samples)")
+    });
+    let lost = told(Fate::Lost, "no visible item lost", "visible items lost");
+    // Those between culled and lost.
+    let returned = text::significant(means[1..4].iter().sum());
+    let returned = format!("{returned} of {items} items returned per view");
+    text::joined([returned, extra, hidden, lost])
 }
+
+/// Result for an item in a view, one of [`KINDS`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Fate {
+    Culled,
+    Visible,
+    FalsePositive,
+    Hidden,
+    Lost,
+}
+
+/// Scene-local to clip coordinates; near depth is -1, far depth 1.
+fn clip_matrix(camera: &Camera, origin: DVec3, is_downward: bool) -> DMat4 {
+    let Some(matrix) = camera.lens.matrix() else {
+        let view = camera.frame.relative_to(origin).world_to_eye();
+        return camera.lens.projection(ClipSpace::OpenGl) * view;
+    };
+    let [x, y, z, w] = matrix.rows().map(DVec4::from);
+    let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
+    let [near, far] = (matrix.unprojected()).map_or([lowest, 1.0], |found| found.depths);
+    let z = (2.0 * z - (near + far) * w) / (far - near);
+    // The page draws y upward, also for Vulkan.
+    let y = if is_downward { -y } else { y };
+    DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
+}
+
+/// Most nodes of a view that are drawn.
+const MOST_NODES: usize = 256;
 
 /// Digits of packed numbers, safe in JSON and HTML.
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
@@ -223,162 +277,137 @@ impl Packed {
     }
 
     /// 0, -1, 1, -2, .. as 0, 1, 2, 3, ..
-    fn push_signed(&mut self, number: i64) {
-        self.push((number << 1 ^ number >> 63) as u64);
+    fn push_signed(&mut self, numbers: I64Vec3) {
+        for number in numbers.to_array() {
+            self.push((number << 1 ^ number >> 63) as u64);
+        }
     }
 }
 
-/// Members of a set as packed runs.
-///
-/// A run is twice the gap before it, plus 1 if it is longer than 1; then its length less 2.
-fn runs(set: impl Iterator<Item = bool>) -> String {
-    let (mut packed, mut gap, mut run) = (Packed::default(), 0, 0);
-    for is_member in set.chain([false]) {
-        if is_member {
-            run += 1;
-            continue;
-        }
-        if run > 0 {
-            packed.push(2 * gap + u64::from(run > 1));
-            if run > 1 {
-                packed.push(run - 2);
-            }
-            (gap, run) = (0, 0);
-        }
-        gap += 1;
+/// Kinds of an item or node in a view, at most.
+const KINDS: usize = 5;
+
+/// Kinds as packed runs: the length less 1, times [`KINDS`], plus the kind.
+fn runs(kinds: &[u8]) -> String {
+    let mut packed = Packed::default();
+    for run in kinds.chunk_by(u8::eq) {
+        packed.push(((run.len() - 1) * KINDS + usize::from(run[0])) as u64);
     }
     packed.0
 }
 
-/// Kinds of [`Fate`].
-pub const FATES: usize = 5;
-
-/// Result for an item in a view.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Fate {
-    Culled,
-    Visible,
-    FalsePositive,
-    Hidden,
-    Lost,
-}
-
-/// Everything that the page draws.
-#[derive(Default, Serialize)]
-pub struct ViewData {
-    pub scene: String,
-    pub path: String,
-    pub items: usize,
-    /// Axis that points up, y or z.
-    up: &'static str,
+/// Places that the page draws: steps from the lowest corner of all items.
+struct Grid {
     /// Steps per axis that corners are rounded to, outward.
     steps: u32,
     /// Lowest corner of all items, scene-local.
-    low: [f64; 3],
+    low: DVec3,
     /// Extent of all items.
-    extent: [f64; 3],
-    /// Scene-local zero in world coordinates.
-    origin: [f64; 3],
-    /// Ids of the items in the order of the curve: signed differences.
-    ids: String,
-    /// Lower corner of each item less the one before, signed, and the extents.
-    boxes: String,
-    pub samples: Option<String>,
-    pub frames: Vec<Frame>,
-    pub structures: Vec<Counters>,
+    extent: DVec3,
 }
 
-/// A view of the path.
-#[derive(Clone, Default, Serialize)]
-pub struct Frame {
-    /// Index in the path.
-    pub camera: usize,
-    /// Scene-local to clip coordinates (near depth -1, far depth 1), column by column.
-    clip: [f64; 16],
-    /// Items by their fates, in the order of the curve.
-    visible: String,
-    false_positive: String,
-    hidden: String,
-    lost: String,
-}
-
-/// Tests that a structure made, per view.
-#[derive(Serialize)]
-pub struct Counters {
-    pub name: String,
-    pub nodes_tested: Vec<u64>,
-    pub items_tested: Vec<u64>,
-}
-
-impl ViewData {
-    /// Data without views, and the items in the order of the curve.
-    pub fn of(scene: &Scene, path: &str) -> (ViewData, Vec<ItemId>) {
-        // Few items may be far smaller than the scene.
-        let steps: u32 = 1 << [20, 16][usize::from(scene.items.len() > 20_000)];
-        let bounds = match scene.items.is_empty() {
-            true => Default::default(),
-            false => [scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3()],
-        };
-        let (low, extent) = (bounds[0], bounds[1] - bounds[0]);
-        let scale = extent.map(|e| if e > 0.0 { f64::from(steps) / e } else { 0.0 });
-        let corners = |item: usize| {
-            let b = &scene.items[item];
-            let [min, max] = [b.min, b.max].map(|corner| (corner.as_dvec3() - low) * scale);
-            (min.floor().as_i64vec3(), max.ceil().as_i64vec3())
-        };
-        let code = |item: usize| {
-            let (min, max) = corners(item);
-            let [x, y, z] = ((min + max) / 2).to_array().map(|c| c as u32);
-            (morton_encode_u64(x, y, z), item)
-        };
-        let mut order: Vec<(u64, usize)> = (0..scene.items.len()).map(code).collect();
-        order.sort_unstable();
-        let (mut ids, mut boxes) = (Packed::default(), Packed::default());
-        let (mut id, mut low_corner) = (0, I64Vec3::ZERO);
-        for &(_, item) in &order {
-            let row = i64::from(scene.row_of(item as ItemId));
-            ids.push_signed(row - id);
-            let (min, max) = corners(item);
-            for difference in (min - low_corner).to_array() {
-                boxes.push_signed(difference);
-            }
-            for side in (max - min).to_array() {
-                boxes.push(side as u64);
-            }
-            (id, low_corner) = (row, min);
+impl Grid {
+    /// The grid of a scene with some triangles.
+    fn of(scene: &Scene, triangles: usize) -> Grid {
+        let bounds = scene.world_bounds();
+        Grid {
+            // Few items may be far smaller than the scene.
+            steps: 1 << [20, 16][usize::from(scene.items.len() + triangles > 20_000)],
+            low: bounds.min - scene.origin,
+            extent: bounds.max - bounds.min,
         }
-        let data = ViewData {
-            scene: scene.name.clone(),
-            path: path.to_owned(),
-            items: scene.items.len(),
-            up: scene.up.name(),
-            steps,
-            low: low.to_array(),
-            extent: extent.to_array(),
-            origin: scene.origin.to_array(),
-            ids: ids.0,
-            boxes: boxes.0,
-            ..ViewData::default()
-        };
-        let order = order.into_iter().map(|(_, item)| item as ItemId);
-        (data, order.collect())
     }
-}
 
-/// Scene-local to clip coordinates; near depth is -1, far depth 1.
-fn clip_matrix(camera: &Camera, origin: DVec3, is_downward: bool) -> DMat4 {
-    let Some(matrix) = camera.lens.matrix() else {
-        let view = camera.frame.relative_to(origin).world_to_eye();
-        return camera.lens.projection(ClipSpace::OpenGl) * view;
-    };
-    let [x, y, z, w] = matrix.rows().map(DVec4::from);
-    let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
-    let found = matrix.unprojected();
-    let [near, far] = found.as_ref().map_or([lowest, 1.0], |found| found.depths);
-    let z = (2.0 * z - (near + far) * w) / (far - near);
-    // The page draws y upward, also for Vulkan.
-    let y = if is_downward { -y } else { y };
-    DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
+    /// Steps to a point; nodes may reach beyond the items.
+    fn at(&self, point: Vec3) -> DVec3 {
+        let steps = f64::from(self.steps);
+        let scale = self.extent.map(|e| if e > 0.0 { steps / e } else { 0.0 });
+        ((point.as_dvec3() - self.low) * scale).clamp(DVec3::ZERO, DVec3::splat(steps))
+    }
+
+    fn corners(&self, b: &Aabb) -> [I64Vec3; 2] {
+        let [min, max] = [b.min, b.max].map(|corner| self.at(corner));
+        [min.floor().as_i64vec3(), max.ceil().as_i64vec3()]
+    }
+
+    /// The items in the order of a curve.
+    fn order(&self, items: &[Aabb]) -> Vec<ItemId> {
+        let code = |(item, b): (usize, &Aabb)| {
+            let [min, max] = self.corners(b);
+            let [x, y, z] = ((min + max) / 2).to_array().map(|c| c as u32);
+            (morton_encode_u64(x, y, z), item as ItemId)
+        };
+        let mut order: Vec<_> = items.iter().enumerate().map(code).collect();
+        order.sort_unstable();
+        order.into_iter().map(|(_, item)| item).collect()
+    }
+
+    /// Lower corner of each box less the one before, signed, and the extents.
+    fn boxes<'b>(&self, boxes: impl Iterator<Item = &'b Aabb>) -> String {
+        let (mut packed, mut before) = (Packed::default(), I64Vec3::ZERO);
+        for b in boxes {
+            let [min, max] = self.corners(b);
+            packed.push_signed(min - before);
+            let sides = (max - min).to_array();
+            sides.into_iter().for_each(|side| packed.push(side as u64));
+            before = min;
+        }
+        packed.0
+    }
+
+    /// Triangles of the items in their order.
+    ///
+    /// How many each has; for each corner 0 if its point is new, else how many came since,
+    /// from 1; the points less the one before, signed.
+    fn mesh(&self, all: &Surfaces, order: &[ItemId]) -> [String; 3] {
+        let [mut counts, mut corners, mut points] = <[Packed; 3]>::default();
+        // Numbers from 1 of points that came.
+        let mut numbers = vec![0; all.points.len()];
+        let (mut count, mut before) = (0, I64Vec3::ZERO);
+        for &item in order {
+            let own = &all.triangles[all.range(item as usize)];
+            counts.push(own.len() as u64);
+            for &point in own.as_flattened() {
+                let number = &mut numbers[point as usize];
+                if *number > 0 {
+                    corners.push(count + 1 - *number);
+                    continue;
+                }
+                count += 1;
+                *number = count;
+                corners.push(0);
+                let at = self.at(all.points[point as usize]).round().as_i64vec3();
+                points.push_signed(at - before);
+                before = at;
+            }
+        }
+        [counts.0, corners.0, points.0]
+    }
+
+    /// Nodes that queries visit: their boxes, and for each view the kinds of all.
+    ///
+    /// Rejected (1), opened or accepted; of a view the [`MOST_NODES`] of the upper levels.
+    fn nodes(&self, cells: &[TreeCell<'_>], views: &[CameraView]) -> Value {
+        let kinds = views.iter().map(|view| {
+            let found = cells.iter().zip(verdicts(cells, view.as_any())).enumerate();
+            let visited = found.filter_map(|(cell, (own, verdict))| {
+                let kind = 1 + verdict? as u8;
+                Some((own.level, cell, kind))
+            });
+            let mut visited: Vec<(u32, usize, u8)> = visited.collect();
+            visited.sort_unstable();
+            let mut kinds = vec![0; cells.len()];
+            let drawn = visited.into_iter().take(MOST_NODES);
+            drawn.for_each(|(_, cell, kind)| kinds[cell] = kind);
+            kinds
+        });
+        let kinds: Vec<Vec<u8>> = kinds.collect();
+        let is_drawn = |cell: &usize| kinds.iter().any(|kinds| kinds[*cell] > 0);
+        let drawn = (0..cells.len()).filter(is_drawn);
+        let boxes = self.boxes(drawn.map(|cell| &cells[cell].bounds));
+        let kinds: Vec<String> = kinds.iter().map(|kinds| runs(kinds)).collect();
+        json!({ "boxes": boxes, "kinds": kinds })
+    }
 }
 
 #[cfg(test)]
@@ -419,14 +448,10 @@ mod tests {
         [0, 31, 32, 1023, 1024]
             .into_iter()
             .for_each(|n| packed.push(n));
-        [0, -1, 1, -2, i64::MIN]
-            .into_iter()
-            .for_each(|n| packed.push_signed(n));
-        assert_eq!(packed.0, "AfgB_fggBABCD____________P");
-        let set = |text: &str| runs(text.bytes().map(|b| b == b'x'));
-        assert_eq!(
-            [set(""), set("..."), set("x"), set("..x.xxx")],
-            ["", "", "A", "EDB"]
-        );
+        packed.push_signed(I64Vec3::new(0, -1, 1));
+        packed.push_signed(I64Vec3::new(-2, i64::MIN, 0));
+        assert_eq!(packed.0, "AfgB_fggBABCD____________PA");
+        let of = |text: &str| runs(&text.bytes().map(|b| b - b'0').collect::<Vec<_>>());
+        assert_eq!([of(""), of("4"), of("0001222")], ["", "E", "KBM"]);
     }
 }

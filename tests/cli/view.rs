@@ -48,32 +48,24 @@ fn signed(number: u64) -> i64 {
     (number >> 1) as i64 ^ -((number & 1) as i64)
 }
 
-/// Ids of the items in the order of the sets.
+/// Ids of the items in the order of the page.
 fn ids(data: &Value) -> Vec<i64> {
-    let differences = unpacked(&data["ids"]).into_iter().map(signed);
-    let sums = differences.scan(0, |id, difference| {
-        *id += difference;
-        Some(*id)
-    });
-    sums.collect()
+    let ids = unpacked(&data["ids"]).into_iter();
+    ids.map(|id| id as i64).collect()
 }
 
-/// Members of sets, ascending by id.
-fn members(ids: &[i64], sets: &[&Value]) -> Vec<i64> {
-    let mut found = Vec::new();
-    for set in sets {
-        let mut numbers = unpacked(set).into_iter();
-        let mut at = 0;
-        while let Some(head) = numbers.next() {
-            at += (head / 2) as usize;
-            let length = match head % 2 {
-                0 => 1,
-                _ => numbers.next().expect("a length") as usize + 2,
-            };
-            found.extend(&ids[at..at + length]);
-            at += length;
+/// Those of some kinds, ascending by id: packed runs are five times the length less 1, plus
+/// the kind.
+fn members(ids: &[i64], packed: &Value, kinds: &[u64]) -> Vec<i64> {
+    let (mut found, mut at) = (Vec::new(), 0);
+    for run in unpacked(packed) {
+        let end = at + (run / 5) as usize + 1;
+        if kinds.contains(&(run % 5)) {
+            found.extend(&ids[at..end]);
         }
+        at = end;
     }
+    assert_eq!(at, ids.len(), "kinds of other items");
     found.sort_unstable();
     found
 }
@@ -125,28 +117,30 @@ fn sets_and_counters_of_every_view_are_those_of_the_query() {
         assert_eq!(rows.len(), 2 * frames.len(), "{scene} {path}");
         for (n, frame) in frames.iter().enumerate() {
             assert_eq!(frame["camera"], n);
-            let returned = ["visible", "false_positive", "hidden"].map(|key| &frame[key]);
             let wanted: Vec<i64> = rows[2 * n]["visible_ids"]
                 .split_whitespace()
                 .map(|id| id.parse().expect("an id"))
                 .collect();
-            assert_eq!(members(&ids, &returned), wanted, "{scene} {path} {n}");
-            for key in ["visible", "false_positive", "hidden", "lost"] {
-                if frame[key] != "" {
-                    seen.insert(key);
-                }
+            assert_eq!(
+                members(&ids, &frame["fates"], &[1, 2, 3]),
+                wanted,
+                "{scene} {path} {n}"
+            );
+            let fates = ["culled", "visible", "false_positive", "hidden", "lost"];
+            for run in unpacked(&frame["fates"]) {
+                seen.insert(fates[run as usize % 5]);
             }
             for (own, row) in array(&data["structures"]).iter().zip(&rows[2 * n..]) {
-                assert_eq!(own["name"], row["structure"]);
-                for column in ["nodes_tested", "items_tested"] {
-                    assert_eq!(own[column][n], number(row, column), "{scene} {n} {column}");
+                assert_eq!(own[0], row["structure"]);
+                for (k, column) in ["nodes_tested", "items_tested"].into_iter().enumerate() {
+                    assert_eq!(own[1][n][k], number(row, column), "{scene} {n} {column}");
                 }
             }
         }
     }
     assert_eq!(
         seen,
-        set("false_positive hidden visible"),
+        set("culled false_positive hidden visible"),
         "cases of too little variety"
     );
 }
@@ -188,6 +182,80 @@ fn boxes_hold_the_items() {
             );
         }
     }
+}
+
+/// Triangles of a mesh in the items' order, corners on the grid of the boxes.
+#[test]
+fn triangles_lie_within_the_boxes_of_their_items() {
+    let folder = folder(&[]);
+    for (scene, count) in [
+        ("mesh:forest:n=3000", 3068),
+        ("mesh:terrain:n=40000", 41472),
+    ] {
+        let options = format!("--scene {scene} --path orbit:frames=1 --structure linear");
+        let data = data(&page(folder.path(), &options));
+        assert_eq!(data["triangles"], count, "{scene}");
+        let [counts, corners, steps] = [0, 1, 2].map(|part| unpacked(&data["mesh"][part]));
+        assert_eq!(counts.iter().sum::<u64>(), count, "{scene}");
+        assert_eq!(corners.len() as u64, 3 * count, "{scene}");
+        let mut steps = steps.into_iter().map(signed);
+        let (mut at, mut points) = ([0; 3], Vec::new());
+        let mut corners = corners.into_iter();
+        let (mut low, boxes) = ([0; 3], unpacked(&data["boxes"]));
+        for (count, packed) in counts.into_iter().zip(boxes.chunks(6)) {
+            let (mut min, mut max) = ([i64::MAX; 3], [i64::MIN; 3]);
+            for _ in 0..3 * count {
+                let back = corners.next().expect("a corner") as usize;
+                if back == 0 {
+                    at = at.map(|x| x + steps.next().expect("a point"));
+                    points.push(at);
+                }
+                let point = points[points.len() - back.max(1)];
+                min = [0, 1, 2].map(|k| min[k].min(point[k]));
+                max = [0, 1, 2].map(|k| max[k].max(point[k]));
+            }
+            for k in 0..3 {
+                low[k] += signed(packed[k]);
+                let high = low[k] + packed[3 + k] as i64;
+                assert!(
+                    (0..=1).contains(&(min[k] - low[k])),
+                    "{scene} {min:?} {low:?}"
+                );
+                assert!((0..=1).contains(&(high - max[k])), "{scene} {max:?} {high}");
+            }
+        }
+        assert!(
+            corners.next().is_none() && steps.next().is_none(),
+            "{scene}"
+        );
+    }
+    let options = "--scene mesh:spheres:n=301000 --path orbit:frames=1 --structure linear";
+    let data = data(&page(folder.path(), options));
+    assert!(data["triangles"] == 300_800 && data["mesh"].is_null() && data["nodes"].is_null());
+}
+
+/// Of many nodes those of the upper levels.
+#[test]
+fn nodes_are_those_that_the_first_structure_with_nodes_tests() {
+    let folder = folder(&[]);
+    let options =
+        "--scene city:n=9000 --path teleport:frames=12 --structure linear,bvh:leaf=2,wide";
+    let data = data(&page(folder.path(), options));
+    let (name, nodes) = (&data["nodes"][0], &data["nodes"][1]);
+    assert_eq!(*name, data["structures"][1][0]);
+    let boxes = unpacked(&nodes["boxes"]).len() / 6;
+    let runs = unpacked(&nodes["kinds"][0]);
+    let cells: u64 = runs.iter().map(|run| run / 5 + 1).sum();
+    let all: Vec<i64> = (0..cells as i64).collect();
+    let (mut union, mut is_cut) = (BTreeSet::new(), [false; 2]);
+    for (n, kinds) in array(&nodes["kinds"]).iter().enumerate() {
+        let found = members(&all, kinds, &[1, 2, 3]);
+        let tested = data["structures"][1][1][n][0].as_u64().expect("a number");
+        assert_eq!(found.len() as u64, tested.min(256), "{n}");
+        is_cut[usize::from(tested > 256)] = true;
+        union.extend(found);
+    }
+    assert_eq!((union.len(), is_cut), (boxes, [true; 2]));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 "use strict";
-// A scene of boxes in 3-D along a path of cameras; the state is in the hash of the address.
+// A scene of boxes or triangles in 3-D along a path of cameras; the state is in the hash of the address.
 (() => {
-  const { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH } = scene;
+  const { mesh, nodes, runs, data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH } = scene;
   const $ = (id) => document.getElementById(id);
   const el = (tag, text = "", props = {}) => Object.assign(document.createElement(tag), { textContent: text, ...props });
   const count = (n) => Math.round(n).toLocaleString("en");
@@ -10,21 +10,23 @@
   // ---- state, kept in the hash of the address
   const ZOOM = 1.7;
   const HOME = { yaw: -0.9, pitch: 0.6, distance: 0, target: [0, 0, 0] };
-  const look = { ...HOME, frame: 0, through: false, off: new Set() };
+  const look = { ...HOME, frame: 0, through: false, boxes: false, nodes: false, off: new Set() };
+  const SWITCHES = ["through", "boxes", "nodes"];
   const keep = () => {
     const numbers = [look.yaw, look.pitch, look.distance, ...look.target].map((x) => +x.toPrecision(5));
     const parts = [`frame=${look.frame}`, `look=${numbers.join(",")}`];
-    if (look.through) parts.push("through=1");
+    SWITCHES.forEach((key) => look[key] && parts.push(`${key}=1`));
     if (look.off.size) parts.push(`off=${[...look.off].join(",")}`);
     history.replaceState(null, "", "#" + parts.join("&"));
   };
   const read = () => {
-    [look.through, look.off] = [false, new Set()];
+    SWITCHES.forEach((key) => (look[key] = false));
+    look.off = new Set();
     for (const [key, text] of new URLSearchParams(location.hash.slice(1))) {
       const numbers = text.split(",").filter(Boolean).map(Number);
       if (!numbers.length || !numbers.every(Number.isFinite)) continue;
       if (key === "frame") look.frame = clamp(Math.round(numbers[0]), 0, frames.length - 1);
-      if (key === "through") look.through = numbers[0] === 1;
+      if (SWITCHES.includes(key)) look[key] = numbers[0] === 1;
       if (key === "off") look.off = new Set(numbers);
       if (key === "look" && numbers.length === 6 && numbers[2] > 0) {
         [look.yaw, look.pitch, look.distance, ...look.target] = numbers;
@@ -54,7 +56,7 @@
     const colours = FATES.map(([, name]) => of(name));
     // Culled items stay in the background.
     colours[0] = ground.map((x, k) => 0.55 * x + 0.45 * colours[0][k]);
-    paint = { ground, ink: of("c6"), colours };
+    paint = { ground, ink: of("c6"), colours, verdicts: VERDICTS.map(([name]) => of(name)) };
     probe.remove();
     legend.forEach((row, n) => row && (row.swatch.style.background = `rgb(${paint.colours[n].map((x) => 255 * x)})`));
   };
@@ -101,6 +103,16 @@
     return [...square(low), ...square(high), ...low.flatMap((p, k) => [...p, ...high[k]])];
   };
 
+  // Nodes of the view by their verdict.
+  const VERDICTS = [["c1", "rejected"], ["c0", "opened"], ["c2", "accepted"]];
+  const visited = () => {
+    const all = [[], [], [], []];
+    runs(nodes.kinds[look.frame], (at, length, kind) => {
+      for (let n = at; kind && n < at + length; n++) all[kind].push(n);
+    });
+    return all.slice(1);
+  };
+
   let picked = -1;
   const REST = 2;
   // Steps of a path, not jumps.
@@ -115,9 +127,16 @@
     const off = [...look.off].reduce((mask, fate) => mask | (1 << fate), 0);
     const small = scale === REST ? 0 : 3;
     const strokes = [];
-    const stroke = (corners, matrix, alpha, width, isBehind) => {
-      strokes.push([corners, matrix, [...paint.ink, alpha], width * ratio, isBehind]);
+    const stroke = (corners, matrix, alpha, width, isBehind, ink = paint.ink) => {
+      strokes.push([corners, matrix, [...ink, alpha], width * ratio, isBehind]);
     };
+    if (nodes && look.nodes) {
+      visited().forEach((own, verdict) => {
+        const edges = own.map((cell) => nodes.at.get(cell)).flatMap((n) => outline(nodes.boxes.slice(n, n + 6)));
+        stroke(edges, clip, 0.25, 0.6, false, paint.verdicts[verdict]);
+        stroke(edges, clip, 0.8, 0.6, true, paint.verdicts[verdict]);
+      });
+    }
     if (window) stroke(square([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), window, 0.8, 1);
     else {
       const edges = frustum(cameras[look.frame]);
@@ -127,19 +146,19 @@
       stroke(edges, clip, 1, 1, true);
     }
     if (picked >= 0) stroke(outline(boxes.subarray(6 * picked, 6 * picked + 6)), clip, 1, 1);
-    gpu.draw({ ...paint, size, off, clip, eye, small, strokes, up: data.up === "y" ? 1 : 2 });
+    gpu.draw({ ...paint, size, off, clip, eye, small, strokes, up: data.up === "y" ? 1 : 2, isMesh: mesh && !look.boxes && !(isCoarse && scale !== REST) });
   };
 
   // ---- one picture per change; in motion with as many pixels as 30 pictures a second allow,
-  // at rest with four samples per pixel
+  // (boxes instead of triangles where that is not enough), at rest with four samples per pixel
   let [waiting, playing, isStale, isDrawn, shown, stepped, before, rest] = [false, false, true, false, -1, 0, 0, 0];
-  let [scale, ceiling, intervals] = [1, REST, []];
+  let [scale, ceiling, intervals, isCoarse] = [1, REST, [], false];
   const adapt = (interval) => {
     if (interval < 250) intervals.push(interval);
     if (intervals.length < 12) return;
     const middle = intervals.sort((a, b) => a - b)[6];
     intervals = [];
-    if (middle > 30) [ceiling, scale] = [scale, Math.max(scale / 1.4, 0.5)];
+    if (middle > 30) [isCoarse, ceiling, scale] = [isCoarse || scale <= 0.5, scale, Math.max(scale / 1.4, 0.5)];
     else if (middle < 20 && scale * 1.4 < ceiling) scale *= 1.4;
   };
   const redraw = () => {
@@ -215,6 +234,13 @@
   $("frame").max = frames.length - 1;
   $("peak").textContent = `returned per view, at most ${count(largest)}`;
 
+  {
+    const many = data.triangles ? ` (${count(data.triangles)} triangles; at most ${count(data.most_triangles)} are drawn)` : "";
+    const what = mesh ? `${count(data.triangles)} triangles` : `boxes${many}`;
+    const whose = nodes ? `those that ${nodes.name} visits, upper levels first` : "none in these structures";
+    $("about").textContent = `Drawn: ${what}. Nodes: ${whose}.`;
+  }
+
   // Everything that depends on the view of the path.
   const tell = () => {
     shown = look.frame;
@@ -231,6 +257,12 @@
     $("frame").value = shown;
     $("frame").setAttribute("aria-valuetext", words);
     canvas.setAttribute("aria-label", `The scene in 3-D, ${words}`);
+    if (nodes) {
+      const counts = visited().map((own) => own.length);
+      const [drawn, all] = [counts.reduce((a, b) => a + b), data.structures.find((own) => own.name === nodes.name).nodes_tested[shown]];
+      $("visited").replaceChildren(`nodes of ${nodes.name}: ${count(drawn)} of ${count(all)} drawn: `);
+      VERDICTS.forEach(([name, word], n) => $("visited").append(n ? ", " : "", el("b", "\u25a1 ", { className: name }), `${count(counts[n])} ${word}`));
+    }
     cursor.setAttribute("x1", shown);
     cursor.setAttribute("x2", shown);
     name();
@@ -245,7 +277,8 @@
   // After a change of the state by the keyboard or a button.
   const settle = () => {
     legend.forEach((row, fate) => row && (row.box.checked = !look.off.has(fate)));
-    $("through").setAttribute("aria-pressed", look.through);
+    SWITCHES.forEach((key) => $(key).setAttribute("aria-pressed", look[key]));
+    $("visited").hidden = !look.nodes;
     $("play").textContent = playing ? "pause" : "play";
     keep();
     redraw();
@@ -264,6 +297,12 @@
     look.through = !look.through && isSound();
     settle();
   };
+  const flip = (key, has) => () => {
+    if (has) look[key] = !look[key];
+    settle();
+  };
+  const [solid, layer] = [flip("boxes", mesh), flip("nodes", nodes)];
+  [$("boxes").hidden, $("nodes").hidden] = [!mesh, !nodes];
   const home = () => {
     Object.assign(look, fit(), { through: false });
     settle();
@@ -298,6 +337,16 @@
     const scale = (look.distance * 1.18) / canvas.clientHeight;
     look.target = plus(plus(look.target, u, -x * scale), v, y * scale);
   };
+  // How far along a ray a triangle is met: NaN or infinite if it is not.
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const hit = (from, ray, corner) => {
+    const [a, b, c] = [0, 3, 6].map((k) => mesh.at.subarray(3 * corner + k, 3 * corner + k + 3));
+    const [u, v, w] = [minus(b, a), minus(c, a), minus(from, a)];
+    const [p, q] = [cross(ray, v), cross(w, u)];
+    const scale = dot(u, p);
+    const [x, y] = [dot(w, p) / scale, dot(ray, q) / scale];
+    return x >= 0 && y >= 0 && x + y <= 1 ? dot(v, q) / scale : NaN;
+  };
   // The first item along the ray through a point of the canvas.
   const pick = (event) => {
     const area = canvas.getBoundingClientRect();
@@ -315,7 +364,13 @@
         enter = Math.max(enter, Math.min(p, q));
         leave = Math.min(leave, Math.max(p, q));
       }
-      if (enter > 0 && enter <= leave && enter < first) [best, first] = [n, enter];
+      if (mesh && !look.boxes) {
+        if (leave < 0 || enter > leave) continue;
+        for (let t = 3 * mesh.first[n]; t < 3 * mesh.first[n + 1]; t += 3) {
+          const at = hit(a, ray, t);
+          if (at > 0 && at < first) [best, first] = [n, at];
+        }
+      } else if (enter > 0 && enter <= leave && enter < first) [best, first] = [n, enter];
     }
     return [best, plus(a, ray, first)];
   };
@@ -364,7 +419,7 @@
     redraw();
   }, { passive: false });
   const KEYS = {
-    " ": play, c: through, f: go, 0: home,
+    " ": play, c: through, b: solid, n: layer, f: go, 0: home,
     ArrowLeft: (e) => step(e.shiftKey ? -10 : -1), ArrowRight: (e) => step(e.shiftKey ? 10 : 1),
     Home: () => step(-frames.length), End: () => step(frames.length),
     a: () => turn(-0.1, 0), d: () => turn(0.1, 0), w: () => turn(0, 0.1), s: () => turn(0, -0.1),
@@ -382,6 +437,8 @@
   });
   $("play").addEventListener("click", play);
   $("through").addEventListener("click", through);
+  $("boxes").addEventListener("click", solid);
+  $("nodes").addEventListener("click", layer);
   $("frame").addEventListener("input", () => {
     look.frame = Number($("frame").value);
     redraw();
@@ -399,7 +456,7 @@
   canvas.addEventListener("webglcontextlost", () => fault("WebGL2: the context was lost; expected a page loaded again"));
 
   try {
-    if (gl) gpu = painter(gl, boxes, data.items);
+    if (gl) gpu = painter(gl, boxes, data.items, mesh);
     else fault("WebGL2: not available in this browser; expected one that has it");
   } catch (error) {
     fault(`WebGL2: ${String(error.message).split("\n")[0]}; expected shaders that compile`);

@@ -1,5 +1,5 @@
 "use strict";
-// The data of a view (#data, written by view_data.rs): boxes, sets of items, cameras, and
+// The data of a view (#data, written by view.rs): boxes, triangles, sets of items, cameras, and
 // the matrices to draw them with.
 const scene = (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
@@ -23,14 +23,13 @@ const scene = (() => {
     };
     return { next, signed, more: () => at < text.length };
   };
-  // Calls `each` with the first member and the length of every run of a set.
+  // Calls `each` with the first member, the length and the kind of every run.
   const runs = (text, each) => {
     const { next, more } = reader(text);
     for (let at = 0; more(); ) {
       const head = next();
-      const length = head % 2 ? next() + 2 : 1;
-      at += Math.floor(head / 2);
-      each(at, length);
+      const length = Math.floor(head / 5) + 1;
+      each(at, length, head % 5);
       at += length;
     }
   };
@@ -44,42 +43,81 @@ const scene = (() => {
     ["lost", "c1", "lost: visible, not returned"],
   ];
   const frames = data.frames;
+  data.structures = data.structures.map(([name, tests]) => {
+    const [nodes_tested, items_tested] = [0, 1].map((kind) => tests.map((tested) => tested[kind]));
+    return { name, nodes_tested, items_tested };
+  });
   for (const frame of frames) {
-    frame.counts = FATES.map(([key], fate) => {
-      let sum = 0;
-      if (fate) runs(frame[key], (_, length) => (sum += length));
-      return sum;
-    });
-    frame.counts[0] = data.items - frame.counts.reduce((a, b) => a + b, 0);
+    frame.counts = FATES.map(() => 0);
+    runs(frame.fates, (_, length, fate) => (frame.counts[fate] += length));
     frame.returned = frame.counts[1] + frame.counts[2] + frame.counts[3];
   }
   // Whole rows of textures.
   const padded = 1024 * Math.ceil(data.items / 1024);
   const fates = new Uint8Array(padded);
-  const decode = (frame) => {
-    fates.fill(0);
-    FATES.slice(1).forEach(([key], n) => runs(frame[key], (at, length) => fates.fill(n + 1, at, at + length)));
-  };
+  const decode = (frame) => runs(frame.fates, (at, length, fate) => fates.fill(fate, at, at + length));
+
+  // A vector with z up, with the axes of the scene.
+  const upright = ([x, y, z]) => (data.up === "y" ? [y, z, x] : [x, y, z]);
+  const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+  const plus = (a, b, by = 1) => [a[0] + b[0] * by, a[1] + b[1] * by, a[2] + b[2] * by];
+  const length = (a) => Math.hypot(a[0], a[1], a[2]);
 
   // ---- boxes, in units of half the scene's diagonal about its centre
   const radius = Math.hypot(...data.extent) / 2 || 1;
   const bounds = data.extent.map((side) => side / 2 / radius);
   const centre = data.low.map((low, k) => low + data.extent[k] / 2);
-  const boxes = new Float32Array(6 * padded);
-  const ids = new Uint32Array(data.items);
-  {
-    const [id, box] = [reader(data.ids), reader(data.boxes)];
-    const corner = [0, 0, 0];
-    const place = (step, k) => (data.low[k] + (step / data.steps) * data.extent[k] - centre[k]) / radius;
-    for (let n = 0; n < data.items; n++) {
-      ids[n] = (n ? ids[n - 1] : 0) + id.signed();
+  const place = (step, k) => (data.low[k] + (step / data.steps) * data.extent[k] - centre[k]) / radius;
+  const unpacked = (text, all) => {
+    const [box, corner] = [reader(text), [0, 0, 0]];
+    for (let n = 0; box.more(); n += 6) {
       for (let k = 0; k < 3; k++) corner[k] += box.signed();
       for (let k = 0; k < 3; k++) {
-        boxes[6 * n + k] = place(corner[k], k);
-        boxes[6 * n + 3 + k] = place(corner[k] + box.next(), k);
+        all[n + k] = place(corner[k], k);
+        all[n + 3 + k] = place(corner[k] + box.next(), k);
       }
     }
+    return all;
+  };
+  const boxes = unpacked(data.boxes, new Float32Array(6 * padded));
+  const ids = new Uint32Array(data.items);
+  {
+    const id = reader(data.ids);
+    for (let n = 0; n < data.items; n++) ids[n] = id.next();
   }
+  // Nodes of a structure that the queries visited: where the boxes are of those that are drawn.
+  const nodes = data.nodes && (() => {
+    const [name, { boxes, kinds }] = data.nodes;
+    const drawn = new Set();
+    kinds.forEach((text) => runs(text, (at, length, kind) => {
+      for (let n = at; kind && n < at + length; n++) drawn.add(n);
+    }));
+    const at = new Map([...drawn].sort((a, b) => a - b).map((cell, n) => [cell, 6 * n]));
+    return { name, kinds, at, boxes: unpacked(boxes, []) };
+  })();
+
+  // ---- triangles: the first of each item, and a place, an item and a shade for each corner
+  const mesh = data.mesh && (() => {
+    const [counts, corners, points] = data.mesh.map(reader);
+    const first = new Uint32Array(data.items + 1);
+    for (let n = 0; n < data.items; n++) first[n + 1] = first[n] + counts.next();
+    const count = 3 * first[data.items];
+    const [at, own, known, step] = [new Float32Array(3 * count), new Uint32Array(count), [], [0, 0, 0]];
+    const light = upright([0.35, 0.5, 0.79]);
+    for (let item = 0, n = 0; n < count; n++) {
+      const back = corners.next();
+      if (!back) known.push(...step.map((x, k) => place((step[k] = x + points.signed()), k)));
+      for (let k = 0; k < 3; k++) at[3 * n + k] = known[known.length + k - 3 * (back || 1)];
+      if (n % 3 < 2) continue;
+      while (n >= 3 * first[item + 1]) item++;
+      const [a, b, c] = [2, 1, 0].map((k) => at.subarray(3 * (n - k), 3 * (n - k) + 3));
+      const [u, v] = [minus(b, a), minus(c, a)];
+      const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+      const lit = (normal[0] * light[0] + normal[1] * light[1] + normal[2] * light[2]) / (length(normal) || 1);
+      own.fill(256 * item + Math.round(255 * (0.7 + 0.3 * lit)), n - 2, n + 1);
+    }
+    return { first, at, own };
+  })();
 
   const world = (x, k) => data.origin[k] + centre[k] + radius * x;
 
@@ -103,12 +141,7 @@ const scene = (() => {
     }
     return [4, 5, 6, 7].flatMap((c) => rows.map((row) => row[c]));
   };
-  // A vector with z up, with the axes of the scene.
-  const upright = ([x, y, z]) => (data.up === "y" ? [y, z, x] : [x, y, z]);
   const scaled = (x, y, z) => [x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1];
-  const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  const plus = (a, b, by = 1) => [a[0] + b[0] * by, a[1] + b[1] * by, a[2] + b[2] * by];
-  const length = (a) => Math.hypot(a[0], a[1], a[2]);
 
   // ---- the cameras of the path
   const LOCAL = mul([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...centre, 1], scaled(radius, radius, radius));
@@ -136,5 +169,5 @@ const scene = (() => {
     return { clip, eye, from, corners, isOpen, aspect: side(0, 1) / side(0, 3) };
   });
 
-  return { data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH, world };
+  return { mesh, nodes, runs, data, FATES, frames, fates, decode, boxes, bounds, ids, cameras, mul, apply, inverse, scaled, minus, plus, upright, length, REACH, world };
 })();

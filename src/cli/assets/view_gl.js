@@ -1,5 +1,5 @@
 "use strict";
-// Boxes and lines by WebGL2.
+// Boxes, triangles and lines by WebGL2.
 const painter = (() => {
   const BOX = `precision highp float; precision highp int; precision highp usampler2D;
 uniform highp sampler2D corners; uniform usampler2D fates;
@@ -37,7 +37,18 @@ void main() {
   float dark = .4 * clamp(1.2 - 4. * max(wide.x, max(wide.y, wide.z)), 0., 1.);
   result = vec4(colour * (1. - dark + dark * clamp(min(edge.x, min(edge.y, edge.z)), 0., 1.)), 1);
 }`;
-  // Boxes of a few pixels have one colour.
+  const MESH = `#version 300 es
+precision highp float; precision highp int; precision highp usampler2D;
+layout(location=0) in vec3 place; layout(location=1) in uint own;
+uniform usampler2D fates; uniform mat4 clip; uniform vec3 colours[5]; uniform int off;
+flat out vec3 colour;
+void main() {
+  int item = int(own >> 8);
+  uint fate = texelFetch(fates, ivec2(item & 1023, item >> 10), 0).x;
+  colour = colours[fate] * float(own & 255u) / 255.;
+  gl_Position = (off >> int(fate) & 1) == 1 ? vec4(0, 0, 2, 1) : clip * vec4(place, 1);
+}`;
+  // Triangles and boxes of a few pixels have one colour.
   const PLAIN_COLOUR = `#version 300 es
 precision highp float;
 flat in vec3 colour; out vec4 result;
@@ -132,9 +143,9 @@ void main() { result = colour; }`;
     return runs;
   };
 
-  // Draws `count` boxes of two corners each. Throws if a shader does not compile. No
+  // Draws `count` boxes of two corners each, or their triangles. Throws if a shader does not compile. No
   // instances: software renderers draw each by itself.
-  return (gl, boxes, count) => {
+  return (gl, boxes, count, mesh) => {
     const head = "#version 300 es\n";
     const box = program(gl, `${head}#define EDGES\n${BOX}`, BOX_COLOUR);
     const [plain, line] = [program(gl, head + BOX, PLAIN_COLOUR), program(gl, LINE, LINE_COLOUR)];
@@ -150,6 +161,17 @@ void main() { result = colour; }`;
       order.forEach((item, n) => shape.forEach((corner, k) => (corners[from + shape.length * n + k] = 8 * item + corner)));
     }
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    const [faces, shapes] = [program(gl, MESH, PLAIN_COLOUR), gl.createVertexArray()];
+    if (mesh) {
+      gl.bindVertexArray(shapes);
+      [mesh.at, mesh.own].forEach((numbers, n) => {
+        gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+        gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STATIC_DRAW);
+        gl.enableVertexAttribArray(n);
+        n ? gl.vertexAttribIPointer(n, 1, gl.UNSIGNED_INT, 0, 0) : gl.vertexAttribPointer(n, 3, gl.FLOAT, false, 0, 0);
+      });
+    }
+    // The last buffer that is bound: lines change it in every picture.
     gl.bindVertexArray(lines);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     for (const n of [0, 1]) {
@@ -161,14 +183,23 @@ void main() { result = colour; }`;
     const update = (fates) => states(fates, rows);
     // Boxes of at most `small` pixels are drawn with fewer triangles.
     // `strokes`: [corners, matrix, colour with alpha, half the width in pixels, behind boxes?]
-    const draw = ({ size, ground, colours, off, clip, eye, small, strokes, up }) => {
+    const draw = ({ size, ground, colours, off, clip, eye, small, strokes, up, isMesh }) => {
       gl.viewport(0, 0, ...size);
       gl.clearColor(...ground, 1);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       gl.enable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
+      if (isMesh) {
+        gl.useProgram(faces.made);
+        gl.bindVertexArray(shapes);
+        gl.uniformMatrix4fv(faces.at.clip, false, clip);
+        gl.uniform3fv(faces.at.colours, colours.flat());
+        gl.uniform1i(faces.at.off, off);
+        gl.uniform1i(faces.at.fates, 1);
+        gl.drawArrays(gl.TRIANGLES, 0, mesh.own.length);
+      }
       gl.bindVertexArray(items);
-      const runs = inSight(chunks, clip, size[1], small);
+      const runs = isMesh ? [] : inSight(chunks, clip, size[1], small);
       // Corners of a box, where their indices begin.
       for (const [{ made, at }, areSmall, each, first] of [[box, false, 18, 0], [plain, true, 6, 18 * count]]) {
         gl.useProgram(made);
