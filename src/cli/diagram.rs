@@ -2,6 +2,7 @@
 
 use super::figure::{Axis, CHARACTER, Figure, LINE, Look, STRONG, class, line, mark};
 use super::text::{self, html, shortened};
+use crate::report::unique;
 
 /// Most characters of a name beside a plot.
 const NAME: usize = 20;
@@ -21,16 +22,6 @@ pub struct Point {
     pub level: String,
     pub is_cross: bool,
     pub is_large: bool,
-}
-
-impl Point {
-    /// A bare place.
-    pub fn new(at: [f64; 2]) -> Point {
-        Point {
-            at,
-            ..Point::default()
-        }
-    }
 }
 
 /// Places with the look of a structure.
@@ -92,7 +83,7 @@ impl<'d> Diagram<'d> {
     }
 
     /// Height of a value, px.
-    fn y(&self, value: f64) -> f64 {
+    pub fn y(&self, value: f64) -> f64 {
         10.0 + (self.height - 20.0) * (1.0 - self.axes[1].along(value))
     }
 
@@ -207,15 +198,12 @@ impl<'d> Diagram<'d> {
 
     /// Names beside the plot with the ends of their lines, and heights a line apart.
     fn names(&self) -> Vec<(String, [f64; 2], f64)> {
+        let named = |name: &str, end| (shortened(name, NAME), end, 0.0);
         let end = |series: &Series| {
             let last = series.points.last().map(|point| self.place(point.at));
-            let name = shortened(&series.name, NAME);
-            (name, last.unwrap_or([100.0, self.height]), 0.0)
+            named(&series.name, last.unwrap_or([100.0, self.height]))
         };
-        let level = |(at, name): &(f64, String)| {
-            let end = [100.0, self.y(*at)];
-            (shortened(name, NAME), end, 0.0)
-        };
+        let level = |(at, name): &(f64, String)| named(name, [100.0, self.y(*at)]);
         let mut ends: Vec<(String, [f64; 2], f64)> = match self.joined {
             Joined::Apart => self.levels.iter().map(level).collect(),
             _ => self.series.iter().map(end).collect(),
@@ -283,18 +271,14 @@ pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Fig
     let bottom = LINE * 1.5 * rows.len() as f64 + 8.0;
     let y = |row: usize| LINE * (1.5 * row as f64 + 1.0);
     let mut parts = axis.across(one, bottom);
-    let mut names: Vec<&str> = Vec::new();
+    let names = unique(rows.iter().filter(|row| !row.is_scan).map(|row| &row.name));
     for (n, row) in rows.iter().enumerate() {
         let (x, look, y0) = (axis.percent(row.value), Look::of(&row.name), y(n));
         if let Some(next) = rows.get(n + 1).filter(|_| row.is_tied) {
             parts += &line("tie", [x, axis.percent(next.value)], [y0, y(n + 1)]);
         }
-        let known = names.iter().position(|name| *name == row.name);
-        let place = known.unwrap_or(names.len());
-        if known.is_none() && !row.is_scan {
-            names.push(&row.name);
-        }
-        let class = class(look, row.is_scan, place);
+        let place = names.iter().position(|name| **name == row.name);
+        let class = class(look, row.is_scan, place.unwrap_or(0));
         let range = |ends: Option<[f64; 2]>| ends.map(|ends| ends.map(|end| axis.percent(end)));
         let ends = range(row.ends);
         let mut shape = text::some(ends, |ends| line("interval", ends, [y0, y0]));

@@ -19,19 +19,17 @@ pub const CHARACTER: f64 = 6.8;
 /// Widths of a picture with one figure in a row, and of each of several.
 const WIDTHS: [f64; 2] = [900.0, 460.0];
 
-/// Values with a place on a logarithmic axis, far beyond anything measured. Near
-/// the ends of floating point, steps along an axis would never come to its end.
-const DRAWN: Range<f64> = 1e-30..1e30;
-
 /// Returns true for a value with a place on a logarithmic axis.
+///
+/// These reach far beyond anything measured. Near the ends of floating point, steps along an
+/// axis would never come to its end.
 pub fn is_drawn(value: f64) -> bool {
-    DRAWN.contains(&value)
+    (1e-30..1e30).contains(&value)
 }
 
 /// Ends of an interval that have a place on a logarithmic axis.
 pub fn ends(value: Estimate) -> Option<[f64; 2]> {
-    let ends = value.ends();
-    ends.filter(|ends| ends.iter().all(|end| is_drawn(*end)))
+    (value.ends()).filter(|ends| ends.iter().all(|end| is_drawn(*end)))
 }
 
 /// Note in a caption on points that are not drawn.
@@ -60,15 +58,11 @@ impl<'t> Axis<'t> {
         shown: &'t dyn Fn(f64) -> String,
     ) -> Axis<'t> {
         let values = values.filter(|value| is_drawn(*value));
-        let (least, most) = values.fold((f64::INFINITY, 0.0f64), |(least, most), value| {
-            (least.min(value), most.max(value))
-        });
-        let values = match least <= most {
-            true => least / factor..most * factor,
-            false => 1.0 / factor..factor,
-        };
+        let ends = values.map(|value| [value; 2]);
+        let ends = ends.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        let [least, most] = ends.unwrap_or([1.0; 2]);
         Axis {
-            values,
+            values: least / factor..most * factor,
             is_log: true,
             ..Axis::linear(title, 0.0..1.0, shown)
         }

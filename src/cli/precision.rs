@@ -229,7 +229,7 @@ pub fn figure(p: &Precision) -> Option<Figure> {
     let (scene, path) = (&p.scene, &p.path);
     let caption = format!("{scene}, {path}: error against run time; dashed: misses visible items");
     let points = p.points.iter().filter_map(measured);
-    against(&caption, 3e-5, points.collect())
+    against(&caption, points.collect())
 }
 
 /// The Pareto front within `room` characters.
@@ -248,13 +248,14 @@ fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         p.scene, p.path
     );
     let mut blocks = vec![Block::Line(head)];
+    let (errors_note, front_note) = NOTES.split_once('\n').unwrap_or_default();
     let mut add = |title: &str, table: Table, note: &str| {
         blocks.extend(Block::section(title, table));
         blocks.extend((!note.is_empty()).then(|| Block::line(note)));
     };
     if all {
         let title = "Errors, by test, numbers and planes";
-        add(title, errors_table(&p.points), ERRORS_NOTE);
+        add(title, errors_table(&p.points), errors_note);
     }
     let title = "Pareto front of error, memory and time, fastest first";
     let whole = front_table(p, all);
@@ -264,7 +265,7 @@ fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
         none if none.is_empty() => none,
         gone => format!(" Columns that do not fit here: {gone}."),
     };
-    add(title, front, &(FRONT_NOTE.to_owned() + &gone));
+    add(title, front, &(front_note.trim_end().to_owned() + &gone));
     if all && !p.sweeps.is_empty() {
         for (sweep, name, what) in SWEEPS {
             let rows = p.sweeps.iter().filter(|row| row.sweep == sweep);
@@ -288,18 +289,8 @@ fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     blocks
 }
 
-/// Explanation of the errors.
-const ERRORS_NOTE: &str = "± is the 95 % interval over the cameras; <: none observed, 95 % upper \
-     bound 3/n. FP: false positives, % of the visible items; by source: storage/planes/test, of all \
-     cameras. px: how deep the deepest miss reaches into a view 1080 pixels high. \
-     c is the factor of the conservative epsilon. All structures have the same errors.";
-
-/// Meaning of the front.
-const FRONT_NOTE: &str = "No other point is significantly better in an error, the depth of misses, \
-     memory or time and as good in the rest (intervals paired by camera and by process). alike: \
-     further points of the same errors (--all). c: factor of the conservative epsilon. FP: false \
-     positives, % of the visible items; FN: visible items missed, millionths; <: none observed, \
-     95 % upper bound.";
+/// Explanations of the errors and of the front.
+const NOTES: &str = include_str!("assets/precision_notes.txt");
 
 pub fn named(point: &Point) -> String {
     format!("{} with {}", structure(point), culling(&point.names))

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::diagram::{Diagram, Joined, Point, Row, Series, rows};
-use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out};
+use super::figure::{Axis, Figure, Look, ends, is_drawn, left_out, line};
 use super::run_verdict::times;
 use super::text;
 use crate::report::{Comparison, Reading, ReportCell, Views, grouped};
@@ -100,7 +100,10 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
         // At the level of the table's time, which has an estimator of its own.
         let mean = readings.iter().map(|r| r.ns).sum::<f64>() / readings.len() as f64;
         let scale = cell.time().map_or(1.0, |time| time.value / mean);
-        let point = |reading: &&Reading| Point::new([reading.frame, reading.ns * scale]);
+        let point = |reading: &&Reading| Point {
+            at: [reading.frame, reading.ns * scale],
+            ..Point::default()
+        };
         if readings.len() >= LEAST_READINGS[0] {
             queries = readings.iter().map(|r| r.queries).fold(queries, u32::max);
             let points = readings.iter().map(point).collect();
@@ -140,7 +143,10 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     if visible.len() >= LEAST_READINGS[0] {
         let most = visible.iter().copied().fold(1, u64::max);
         let count = |items: f64| text::count(items as usize);
-        let point = |(frame, items): (usize, &u64)| Point::new([frame as f64, *items as f64]);
+        let point = |(frame, items): (usize, &u64)| Point {
+            at: [frame as f64, *items as f64],
+            ..Point::default()
+        };
         let points = visible.iter().enumerate().map(point).collect();
         let series = Series {
             look: Look::nth(0),
@@ -193,7 +199,7 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
     let mut points: Vec<Measured> = cells.filter_map(measured).collect();
     points.sort_by(|(_, a), (_, b)| a.at[0].total_cmp(&b.at[0]));
     let caption = format!("{}: error against run time, by test", of(first));
-    against(&caption, 1e-4, points)
+    against(&caption, points)
 }
 
 /// A structure, and its time and error at the level of a test.
@@ -232,13 +238,19 @@ fn levels(points: &[Measured]) -> Vec<(f64, String)> {
 
 /// Error against run time of points, the fastest first; `None` without any.
 ///
-/// No error at all is drawn at `none`: a logarithmic axis has no zero.
-pub fn against(caption: &str, none: f64, mut points: Vec<Measured>) -> Option<Figure> {
+/// No error at all is drawn in a gutter: a logarithmic axis has no zero.
+pub fn against(caption: &str, mut points: Vec<Measured>) -> Option<Figure> {
     points.first()?;
     let all = points.len();
+    let errors = points.iter().map(|(_, point)| point.at[1]);
+    let least = errors.filter(|error| is_drawn(*error)).fold(1.0, f64::min);
+    // Half a power below the axis, which begins a power below the least error.
+    let none = 10f64.powf(least.log10().floor() - 1.5);
+    let gutter = none * 2.0;
     for (_, point) in &mut points {
-        point.at[1] = point.at[1].max(none);
-        point.ends = point.ends.map(|ends| ends.map(|end| end.max(none)));
+        let placed = |error: f64| error.max(if error > 0.0 { gutter } else { none });
+        point.at[1] = placed(point.at[1]);
+        point.ends = point.ends.map(|ends| ends.map(placed));
     }
     points.retain(|(_, point)| point.at.iter().all(|value| is_drawn(*value)));
     let beyond = all - points.len();
@@ -255,16 +267,14 @@ pub fn against(caption: &str, none: f64, mut points: Vec<Measured>) -> Option<Fi
         series.push(Series::of(&structure, is_scan, points.collect()));
     }
     let places = || series.iter().flat_map(|series| &series.points);
-    let error = |error: f64| match error <= none * 1.01 {
-        true => "0".to_owned(),
+    let error = |error: f64| match error < gutter {
+        true => "none".to_owned(),
         false => text::significant(error),
     };
     // From nothing to a hundredth at least.
     let errors = places().flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
     let mut y = Axis::log("", errors.chain([none, 1.0]), 1.5, &error);
-    // Powers above zero, whose place is half a step below the last.
     y.ticks = y.powers(10.0);
-    y.ticks.retain(|tick| *tick > none * 2.0);
     y.ticks.push(none);
     let times = places().map(|p| p.at[0]);
     let x = Axis::log("time per query", times, 1.5, &text::time);
@@ -276,7 +286,11 @@ pub fn against(caption: &str, none: f64, mut points: Vec<Measured>) -> Option<Fi
         levels,
         ..Diagram::of(caption, [x, y], Joined::Apart, series)
     };
-    Some(diagram.draw())
+    let (y, mut figure) = (diagram.y(none), diagram.draw());
+    figure
+        .parts
+        .insert_str(0, &line("gutter", [0.0, 100.0], [y, y]));
+    Some(figure)
 }
 
 #[cfg(test)]
@@ -292,30 +306,38 @@ mod tests {
     }
 
     #[test]
-    fn zero_is_no_step_of_the_axis() {
-        for none in [3e-5, 3e-3] {
+    fn no_error_stands_in_a_gutter_below_every_error() {
+        for least in [3e-7, 3e-3, 1.0] {
             let point = |error: f64| {
-                let level = error.to_string();
-                let at = [100.0, error];
                 let point = Point {
-                    at,
-                    level,
+                    at: [100.0, error],
+                    ends: Some([0.0, 2.0]),
+                    is_large: true,
                     ..Point::default()
                 };
                 ("bvh".to_owned(), point)
             };
-            let points = vec![point(0.0), point(1.0)];
-            let drawn = against("", none, points).unwrap().parts;
-            let lines = drawn
-                .split("<line class=\"grid\" x1=\"0.00%\" x2=\"100.00%\" y1=\"")
-                .skip(1);
-            let heights = lines.filter_map(|line| line.split('"').next()?.parse::<f64>().ok());
-            let heights: Vec<f64> = heights.collect();
-            let [first, second, .., zero] = heights[..] else {
-                panic!("{heights:?}")
+            let points = [0.0, least, 2.0].map(point);
+            let drawn = against("", points.into()).unwrap().parts;
+            let heights = |before: &str| {
+                let parts = drawn.split(before).skip(1);
+                let heights = parts.filter_map(|part| part.split(" y").nth(1)?.split('"').nth(1));
+                heights.map(|y| y.parse().unwrap()).collect::<Vec<f64>>()
             };
-            let step = first - second;
-            assert!((0.4..0.7).contains(&((zero - first) / step)), "{heights:?}");
+            let gutter = heights("<line class=\"gutter\"")[0];
+            let marks = heights("<svg x=");
+            let [none, least, most] = marks[..] else {
+                panic!("{drawn}")
+            };
+            assert!(
+                none == gutter && gutter > least + 12.0 && least > most,
+                "{marks:?} {gutter}"
+            );
+            assert!(drawn.contains(">none</text>") && !drawn.contains(">0</text>"));
+            // The interval ends there too.
+            let lines = drawn.split("<line class=\"interval\"").skip(1);
+            let ends = lines.filter(|line| line.contains(&format!("y1=\"{none:.1}\"")));
+            assert!(ends.count() > 0, "{drawn}");
         }
     }
 }
