@@ -10,9 +10,8 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use super::command_args::FunnelArgs;
-use super::diagram::{Row, rows};
 use super::document::{Block, show};
-use super::figure::{Axis, Figure};
+use super::figure::{Axis, Figure, LINE};
 use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
@@ -41,7 +40,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     outputs.extend(tables.iter().map(|file| ("--csv", file)));
     let inputs = [Path::new(&args.study.scene), args.study.path.as_ref()];
     expect_places(&outputs, &inputs)?;
-    let setting = setting(registry, args, None)?;
+    let setting = load(registry, &args.study, ROUNDS, None, HELD)?;
     let input = input(args, &setting)?;
     let about = format!("{}, {}: ", args.study.scene, args.study.path);
     let study = Study::new(about, 1, &args.study.spread)?;
@@ -134,11 +133,8 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
     Ok(chain)
 }
 
-/// Loads the scene, path and structures of the command itself, or of a worker.
-fn setting(registry: &Registry, args: &FunnelArgs, timing: Option<&Timing>) -> Result<Setting> {
-    let held = [1, 2, funnel::BYTES_PER_TRIANGLE];
-    load(registry, &args.study, ROUNDS, timing, held)
-}
+/// Room for structures, one each and more, and bytes per triangle.
+const HELD: [u64; 3] = [1, 2, funnel::BYTES_PER_TRIANGLE];
 
 fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'s>> {
     let (study, views) = (&args.study, (args.frames as usize, args.samples));
@@ -156,7 +152,7 @@ fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'
 
 /// Times every stage in one process.
 pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<ProcessTimes> {
-    let setting = setting(registry, args, Some(timing))?;
+    let setting = load(registry, &args.study, ROUNDS, Some(timing), HELD)?;
     funnel::time(&input(args, &setting)?, &timing.plan()?)
 }
 
@@ -200,30 +196,40 @@ fn table_file(folder: &Path, table: &str) -> PathBuf {
     folder.join(format!("{name}.csv"))
 }
 
-/// Items that each stage of the chain passes.
+/// What each stage of the chain leaves, as bars in the colours of the picture.
 fn passed(report: &FunnelReport) -> Figure {
-    let row = |name: &str, value: f64, unit: &str, note: String| Row {
-        name: name.to_owned(),
-        value,
-        label: format!("{name} {} {unit}", funnel_table::count(value)),
-        note,
-        ..Row::default()
-    };
-    let all = row("all", report.items as f64, "items", String::new());
     let chosen = report.stages.iter().filter(|row| row.is_chosen);
-    let stages = chosen.filter(|row| row.back_end.name != NONE).map(|stage| {
-        let (name, errors) = (stage.back_end.stage.name(), &stage.errors);
-        let by = stage.structure.as_deref().unwrap_or(stage.back_end.name);
-        let given = funnel_table::count(errors.input_count);
-        let note = format!("{name} by {by}: of {given} {}", stage.unit);
-        row(name, errors.output_count, stage.unit, note)
-    });
-    let stages: Vec<Row> = [all].into_iter().chain(stages).collect();
-    let values = stages.iter().map(|row| row.value);
-    let axis = Axis::log("", values, 3.0, &funnel_table::count);
+    let chosen = chosen.filter(|row| row.back_end.name != NONE);
+    let given = chosen.clone().map(|row| row.errors.input_count);
+    // There is no zero.
+    let axis = Axis::log("", given.chain([0.1]), 1.0, &funnel_table::count);
+    let bottom = 2.0 * LINE * chosen.clone().count() as f64;
+    let mut parts = axis.across(None, bottom);
+    for (n, row) in chosen.enumerate() {
+        let (y, stage, errors) = (2.0 * LINE * n as f64, row.back_end.stage, &row.errors);
+        let counts = [errors.input_count, errors.output_count, errors.truth_count];
+        let [all, left, _] = counts.map(funnel_table::count);
+        let (name, unit, at) = (stage.name(), row.unit, y + 12.0);
+        parts += &format!("<text y=\"{at}\">{name}: {left} of {all} {unit}</text>\n");
+        // The picture does not show triangles, and facing the eye is not being seen.
+        let [removed, seen] = [[0, 4], [1, 4], [2, 4], [0, 3], [3, 4]][stage as usize];
+        let colours = [removed, 3, seen].map(|class| FATE_CLASSES[class].colour);
+        for (count, colour) in counts.into_iter().zip(colours) {
+            let (y, width) = (y + LINE, axis.percent(count));
+            parts += &format!(
+                "<rect class=\"bar\" y=\"{y}\" width=\"{width:.2}%\" height=\"10\" fill=\"{colour}\"/>"
+            );
+        }
+    }
     let (scene, path) = (&report.scene, &report.path);
-    let caption = format!("{scene}, {path}: what each stage leaves per view (logarithmic)");
-    rows(caption, &axis, None, &stages)
+    let note = "logarithmic, in the colours of the picture";
+    Figure {
+        caption: format!("{scene}, {path}: what each stage leaves per view; {note}"),
+        margins: [4.0, 24.0],
+        height: bottom + 1.5 * LINE,
+        parts,
+        legend: (String::new(), 0.0),
+    }
 }
 
 /// Tables, figures and the picture as one page.

@@ -301,7 +301,7 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         (
             format!("funnel {small} --samples 32x18"),
             " remain to be drawn and ",
-            "class=\"mark",
+            "<rect class=\"bar\"",
         ),
         (
             format!("precision {small} --cubes 0"),
