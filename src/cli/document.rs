@@ -56,7 +56,7 @@ fn markdown_table(table: &Table) -> String {
 
 /// A table that scrolls inside itself.
 ///
-/// A row of a structure has its name as `data-s`; `is_heat` shades each number by its share of the largest of its row.
+/// A row of a structure has its name as `data-s`; the page shades numbers if `is_heat`.
 fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
     // Tables below one heading differ in their first column.
     let caption = text::joined([heading, table.header.first().map_or("", String::as_str)]);
@@ -66,23 +66,11 @@ fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
     });
     let of_structures = table.header.first().is_some_and(|name| name == "structure");
     let row = |row: &Vec<String>| {
-        // Without the mark of the fastest.
-        let number = |cell: &String| {
-            let digits = cell.trim_start_matches('*').replace(',', "");
-            digits.parse::<f64>().ok()
-        };
-        let most = row.iter().filter_map(number).fold(0.0, f64::max);
-        let cells = row.iter().enumerate().map(|(column, cell)| {
-            let shade = text::some(number(cell).filter(|_| is_heat), |value| {
-                let shade = 1.0 - (most / value).log2() / 3.0;
-                format!(" style=\"--v:{:.2}\"", shade.clamp(0.0, 1.0))
-            });
-            let text = html(cell);
-            match column {
-                0 => format!("<th scope=\"row\">{text}</th>"),
-                n if table.right[n] => format!("<td class=\"n\"{shade}>{text}</td>"),
-                _ => format!("<td>{text}</td>"),
-            }
+        let cells = row.iter().map(|cell| html(cell)).enumerate();
+        let cells = cells.map(|cell| match cell {
+            (0, text) => format!("<th scope=\"row\">{text}</th>"),
+            (n, text) if table.right[n] => format!("<td class=\"n\">{text}</td>"),
+            (_, text) => format!("<td>{text}</td>"),
         });
         let own = row.first().filter(|_| of_structures);
         let own = text::some(own, |name| format!(" data-s=\"{}\"", html(name)));

@@ -20,6 +20,12 @@
     const found = /^[*<>~= ]*(-?[\d,]*\.?\d+(?:e-?\d+)?)(?:±[\d.]+| \[[^\]]*\])?\s*(ns|us|ms|s)?\b/.exec(cell.textContent);
     return found ? Number(found[1].replaceAll(",", "")) * (UNITS[found[2]] || 1) : NaN;
   };
+  // Shades a number by its share of the largest of its row.
+  for (const row of all("table.heat tbody tr")) {
+    const cells = all("td.n", row).filter((cell) => value(cell) > 0);
+    const most = Math.max(...cells.map(value));
+    for (const cell of cells) cell.style.setProperty("--v", Math.max(1 - Math.log2(most / value(cell)) / 3, 0).toFixed(2));
+  }
   const order = (a, b, column) => {
     const [x, y] = [a, b].map((row) => row.cells[column]);
     if (!x.textContent || !y.textContent) return (x.textContent ? 0 : 1) - (y.textContent ? 0 : 1) || 0;
