@@ -196,7 +196,7 @@ fn table_file(folder: &Path, table: &str) -> PathBuf {
     folder.join(format!("{name}.csv"))
 }
 
-/// What each stage of the chain leaves, as bars in the colours of the picture.
+/// Bars of what each stage of the chain leaves, in the colours of the picture.
 fn passed(report: &FunnelReport) -> Figure {
     let chosen = report.stages.iter().filter(|row| row.is_chosen);
     let chosen = chosen.filter(|row| row.back_end.name != NONE);

@@ -54,8 +54,9 @@ fn ids(data: &Value) -> Vec<i64> {
     ids.map(|id| id as i64).collect()
 }
 
-/// Those of some kinds, ascending by id: packed runs are five times the length less 1, plus
-/// the kind.
+/// Members of some kinds, ascending by id.
+///
+/// Packed runs are five times the length less 1, plus the kind.
 fn members(ids: &[i64], packed: &Value, kinds: &[u64]) -> Vec<i64> {
     let (mut found, mut at) = (Vec::new(), 0);
     for run in unpacked(packed) {
@@ -234,7 +235,7 @@ fn triangles_lie_within_the_boxes_of_their_items() {
     assert!(data["triangles"] == 300_800 && data["mesh"].is_null() && data["nodes"].is_null());
 }
 
-/// Of many nodes those of the upper levels.
+/// The upper levels of many nodes.
 #[test]
 fn nodes_are_those_that_the_first_structure_with_nodes_tests() {
     let folder = folder(&[]);
