@@ -100,6 +100,9 @@ USE = """(() => {
     expect(table.querySelector("[aria-sort]"), "sorting is not announced");
   }
   for (const heat of all("table.heat")) {
+    const shaded = all("td", heat).filter((cell) => Number(cell.style.getPropertyValue("--v")) === 1);
+    expect(shaded.length, "no cell is shaded");
+    for (const cell of shaded) expect(!/ [num]?s$/.test(cell.textContent), `shaded: ${cell.textContent}`);
     [...heat.tHead.rows[0].cells].slice(1).forEach((head, n) => {
       head.querySelector("button").click();
       const texts = [...heat.tBodies[0].rows].slice(0, -1).map((row) => row.cells[n + 1].textContent);

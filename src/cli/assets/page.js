@@ -22,9 +22,11 @@
   };
   // Shades a number by its share of the largest of its row.
   for (const row of all("table.heat tbody tr")) {
-    const cells = all("td.n", row).filter((cell) => value(cell) > 0);
-    const most = Math.max(...cells.map(value));
-    for (const cell of cells) cell.style.setProperty("--v", Math.max(1 - Math.log2(most / value(cell)) / 3, 0).toFixed(2));
+    // Without the mark of the fastest; a time is no number.
+    const number = (cell) => Number(cell.textContent.replace(/[*,]/g, ""));
+    const cells = all("td.n", row).filter((cell) => number(cell) > 0);
+    const most = Math.max(...cells.map(number));
+    for (const cell of cells) cell.style.setProperty("--v", Math.max(1 - Math.log2(most / number(cell)) / 3, 0).toFixed(2));
   }
   const order = (a, b, column) => {
     const [x, y] = [a, b].map((row) => row.cells[column]);
