@@ -3,11 +3,10 @@
 //! Also prints the time of finding the region of the eye.
 
 use std::hint::black_box;
-use std::sync::Arc;
 
 use cullbench::measure::Stopwatch;
 use cullbench::visibility::Rays;
-use cullbench::visibility::region::{Pvs, RegionGraph, RegionId, RegionRow, Scratch, Source};
+use cullbench::visibility::region::{Pvs, RegionGraph, RegionId, Scratch};
 
 use super::{loaded, over_builds, ratio, verdict};
 
@@ -22,17 +21,12 @@ const MOST_TIMES: f64 = 1.5;
 /// Passes over the views in a turn, as one takes a microsecond.
 const PASSES: usize = 1000;
 
-fn of_home(row: &RegionRow, home: RegionId) -> &[RegionId] {
-    row.pvs.as_ref().expect("a stored row").row(home)
-}
-
 /// Returns 1 if the floor is missed, else 0.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(SCENE, PATH, only_test);
-    let graph = Arc::new(RegionGraph::of_scene(&scene).expect("rooms"));
+    let graph = RegionGraph::of_scene(&scene).expect("rooms");
     let near = |from: u32, to: u32| from.abs_diff(to) <= SEEN / 2;
-    let pvs = Arc::new(Pvs::of_pairs(graph.len(), near).expect("few regions"));
-    let stored = RegionRow::of(Source::Claim, &graph, Some(pvs));
+    let stored = Pvs::of_pairs(graph.len(), near).expect("few regions");
     let eyes = cameras.cameras.iter().map(|c| Rays::of(c).expect("rays"));
     let eyes: Vec<Rays> = eyes.collect();
     let mut homes: Vec<RegionId> = Vec::new();
@@ -43,7 +37,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         }
     }
     // The stored rows, one after the other.
-    let rows = homes.iter().map(|home| of_home(&stored, *home).to_vec());
+    let rows = homes.iter().map(|home| stored.row(*home).to_vec());
     let rows: Vec<Vec<RegionId>> = rows.collect();
 
     let passes = if only_test { 1 } else { PASSES };
@@ -59,14 +53,14 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
     };
     let mut answer_ns = 0.0;
     // Kept, so that the next ones lie elsewhere.
-    let mut earlier: Vec<(RegionRow, Vec<Vec<RegionId>>)> = Vec::new();
+    let mut earlier: Vec<(Pvs, Vec<Vec<RegionId>>)> = Vec::new();
     let [times, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
         let (stored, rows) = (stored.clone(), rows.clone());
-        let row: &RegionRow = black_box(&stored);
+        let own: &Pvs = black_box(&stored);
         let answer = || {
             answer_ns = time(&mut || {
                 for home in &homes {
-                    read_all(of_home(row, *home));
+                    read_all(own.row(*home));
                 }
             });
             answer_ns
@@ -82,11 +76,11 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
         earlier.push((stored, rows));
         times
     });
-    let row: &RegionRow = black_box(&stored);
+    let pvs = black_box(&stored);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());
     let from_eye = time(&mut || {
         for rays in &eyes {
-            black_box(row.from_eye(rays, &mut scratch, &mut out));
+            black_box(graph.seen_by(rays, Some(pvs), &mut scratch, &mut out));
         }
     });
     let holds = only_test || low <= MOST_TIMES;

@@ -1,12 +1,11 @@
 //! Quake III maps, and archives with scenes in them.
 
-use std::sync::Arc;
 
 use cullbench::camera::{Camera, Frame, Lens};
 use cullbench::index::{Input, Registry};
 use cullbench::scene::{CameraPlace, LoadOptions, Regions, part_names, read_bytes, read_ibsp};
 use cullbench::visibility::Rays;
-use cullbench::visibility::region::{Pvs, RegionGraph, RegionRow, Scratch, Source};
+use cullbench::visibility::region::{Pvs, RegionGraph, Scratch};
 
 use crate::read;
 
@@ -48,8 +47,6 @@ pub fn ibsp(bytes: &[u8]) {
 
 /// Finds what each place sees of the regions.
 pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
-    let graph = Arc::new(graph);
-    let row = RegionRow::of(Source::PortalRect, &graph, None);
     let (mut scratch, mut found) = (Scratch::default(), Vec::new());
     let lens = Lens::perspective(60.0, 1.5, 1.0, None).expect("a lens");
     for place in places {
@@ -60,7 +57,7 @@ pub fn see_through(graph: RegionGraph, places: &[CameraPlace]) {
         let Ok(rays) = Rays::of(&Camera { frame, lens }) else {
             continue;
         };
-        row.from_eye(&rays, &mut scratch, &mut found);
+        graph.seen_by(&rays, None, &mut scratch, &mut found);
         assert!(found.is_sorted() && found.iter().all(|&id| (id as usize) < graph.len()));
     }
 }

@@ -32,11 +32,12 @@ impl World<'_> {
 
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
-        let row = regions.row(name).expect("a row of the region stage");
+        let pairs = regions.pairs(name).expect("a row of the region stage");
         let state = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *state.borrow_mut();
-            row.from_eye(&self.views[view].rays, scratch, seen);
+            let rays = &self.views[view].rays;
+            regions.graph.seen_by(rays, pairs, scratch, seen);
             regions.items.of_regions(seen, marks, out);
         })
     }

@@ -165,7 +165,8 @@ impl Chain {
     }
 }
 
-const PORTAL_RECT: &str = "portal-rect";
+/// The search of the region stage.
+pub const PORTAL_RECT: &str = "portal-rect";
 const MASKED_INNER: &str = "masked-inner";
 /// The test that takes every item for solid.
 pub const Z: &str = "z-test";
@@ -210,7 +211,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
     let mut rows = vec![BackEnd::new(stage, declared, Guarantee::Conservative)];
     match stage {
         StageKind::Region => {
-            let known = region::BACK_ENDS.iter().filter(|row| row.is_for(scene));
+            let known = region::BACK_ENDS.iter().filter(|row| (row.build)(scene));
             rows.extend(known.map(|row| BackEnd::of(stage, row)));
         }
         StageKind::Object => {}
@@ -220,28 +221,27 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
         StageKind::Triangle => {
             rows.extend(TRIANGLE_ROWS.iter().map(|row| BackEnd::of(stage, row)));
         }
-        StageKind::Fragment => rows.extend(fragment_tests(scene, has_cut_outs)),
+        StageKind::Fragment => {
+            let known = FRAGMENT_ROWS.iter();
+            let known = known.filter(|row| (row.build)(scene, has_cut_outs));
+            rows.extend(known.map(|row| BackEnd::of(stage, row)));
+        }
     }
     rows
 }
 
-fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
-    let (exact, unproven) = (Guarantee::SampleExact, Guarantee::Unproven);
-    let test = |declared, guarantee| BackEnd::new(StageKind::Fragment, declared, guarantee);
-    let whole = "the nearest fragment of each sample, exactly";
-    let mut tests = match has_cut_outs {
-        true => vec![
-            test([Z, "the nearest fragment, holes or not"], unproven),
-            test([ALPHA, "the nearest opaque fragment"], exact),
-        ],
-        false => vec![test([Z, whole], exact)],
-    };
-    if matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty()) {
-        let beyond = "the same, but beyond the eye's room only at samples that see its portals";
-        tests.push(test([STENCIL, beyond], exact));
-    }
-    tests
-}
+/// Tests of the fragment stage; each tells whether a scene has what it needs, with holes or not.
+const FRAGMENT_ROWS: &[FragmentRow] = rows! { FragmentRow { name, guarantee, summary, build }
+    Z, Guarantee::SampleExact, "the nearest fragment of each sample, exactly",
+        |_, has_cut_outs| !has_cut_outs;
+    Z, Guarantee::Unproven, "the nearest fragment, holes or not", |_, has_cut_outs| has_cut_outs;
+    ALPHA, Guarantee::SampleExact, "the nearest opaque fragment", |_, has_cut_outs| has_cut_outs;
+    STENCIL, Guarantee::SampleExact,
+        "the same, but beyond the eye's room only at samples that see its portals",
+        |scene, _| matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
+};
+
+type FragmentRow = Row<fn(&Scene, bool) -> bool>;
 
 /// Default test of the fragment stage.
 pub fn default_test(has_cut_outs: bool) -> &'static str {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail, ensure};
 
 use super::error::check_memory;
-use super::stage::{BackEnd, Chain, NONE, StageKind, back_ends, left_out_of};
+use super::stage::{BackEnd, Chain, NONE, PORTAL_RECT, StageKind, back_ends, left_out_of};
 use crate::camera::{CameraError, PlaneOptions};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -22,7 +22,7 @@ use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::OccluderScene;
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{BACK_ENDS, Pvs, RegionGraph, RegionItems, RegionRow, Source};
+use crate::visibility::region::{Pvs, RegionGraph, RegionItems};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, surfaces_of};
 
 /// Bytes per item of structure, solids, occluders and trees for rays.
@@ -273,7 +273,7 @@ fn rows<'l>(
 ) -> Vec<(BackEnd, String)> {
     let stage = back_ends[0].stage;
     let is_there = |row: &BackEnd| {
-        let is_row = || regions.is_some_and(|regions| regions.row(row.name).is_some());
+        let is_row = || regions.is_some_and(|regions| regions.pairs(row.name).is_some());
         stage != StageKind::Region || row.name == NONE || is_row()
     };
     let there = back_ends.into_iter().filter(is_there);
@@ -361,10 +361,11 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
 /// Rooms of a scene, or sectors or clusters of its map.
 pub struct Regions {
     /// Regions and the openings between them.
-    pub graph: Arc<RegionGraph>,
+    pub graph: RegionGraph,
     /// Items of each region.
     pub items: RegionItems,
-    rows: Vec<RegionRow>,
+    /// Pairs of regions that the map stores.
+    table: Option<Pvs>,
 }
 
 impl Regions {
@@ -376,22 +377,19 @@ impl Regions {
             (None, scene::Regions::Leaves(map)) => (RegionGraph::of_quake(map), Pvs::of_quake(map)),
             (None, _) => (RegionGraph::of_scene(scene)?, None),
         };
-        let (graph, table) = (Arc::new(graph), table.map(Arc::new));
-        let there = BACK_ENDS.iter().filter(|row| row.is_for(scene));
-        let rows = there.filter_map(|row| match row.build {
-            Source::PortalRect => Some(RegionRow::of(row.build, &graph, None)),
-            stored => Some(RegionRow::of(stored, &graph, Some(table.clone()?))),
-        });
         Some(Regions {
-            rows: rows.collect(),
             items: RegionItems::of(&graph, scene),
             graph,
+            table,
         })
     }
 
-    /// The back end of a name.
-    pub fn row(&self, name: &str) -> Option<&RegionRow> {
-        self.rows.iter().find(|row| row.back_end.name == name)
+    /// The stored pairs that a back end reads, none for a search; `None` if the map lacks them.
+    pub fn pairs(&self, name: &str) -> Option<Option<&Pvs>> {
+        match name {
+            PORTAL_RECT => Some(None),
+            _ => self.table.as_ref().map(Some),
+        }
     }
 }
 

@@ -52,6 +52,6 @@ pub struct Row<B> {
     pub summary: &'static str,
     /// Guarantee of its answers.
     pub guarantee: Guarantee,
-    /// Function that builds it, or the source of its answers.
+    /// Function that builds it, or tells whether a scene has what it needs.
     pub build: B,
 }

@@ -2,7 +2,7 @@
 //!
 //! Their items are what remains.
 //!
-//! A back end ([`RegionRow`]) searches a [`RegionGraph`]: regions and the openings
+//! A back end ([`BackEnd`]) searches a [`RegionGraph`]: regions and the openings
 //! between them, made from a tiling of rooms or a Doom map.
 //!
 //! Sight is defined by regions and openings alone: a line of sight leaves a region
@@ -17,12 +17,11 @@ mod locate;
 mod quake;
 mod row;
 mod search;
-mod view;
 
 pub use crate::index::IdSet;
 pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
 pub use locate::{RegionItems, without};
-pub use row::{BACK_ENDS, BackEnd, Pvs, RegionRow, Scratch, Source};
+pub use row::{BACK_ENDS, BackEnd, Pvs, Scratch};
 
 #[cfg(test)]
 pub use tests::leads_through;

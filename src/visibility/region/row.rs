@@ -1,8 +1,6 @@
-//! The back ends of the region stage: their table, and each over a graph.
+//! The back ends of the region stage: their table, and their answers over a graph.
 //!
 //! Pairs of regions that may see each other are a set per region, as a map claims.
-
-use std::sync::Arc;
 
 use super::graph::{RegionGraph, RegionId};
 use super::search::Search;
@@ -59,53 +57,24 @@ impl Pvs {
     }
 }
 
-/// A row of the table of back ends.
+/// A row of the table of back ends; tells whether a scene has the regions that it needs.
 ///
 /// The guarantee is of answers from an eye in the world of regions and openings (hiding by
 /// items aside).
-pub type BackEnd = Row<Source>;
-
-/// Source of the answers of a back end.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Source {
-    /// A search with rectangles of the image.
-    PortalRect,
-    /// The table of a Quake III map.
-    Claim,
-    /// The REJECT table of a map.
-    Reject,
-}
+pub type BackEnd = Row<fn(&Scene) -> bool>;
 
 /// All back ends of the region stage.
 pub const BACK_ENDS: &[BackEnd] = rows! { BackEnd { name, build, guarantee, summary }
-    "portal-rect", Source::PortalRect, Guarantee::Conservative,
-        "rectangles of the image, intersected from opening to opening";
-    "stored-pvs", Source::Claim, Guarantee::Unproven,
+    "portal-rect", |scene| matches!(scene.regions, Regions::Tiling(_)) || has_sectors(scene),
+        Guarantee::Conservative, "rectangles of the image, intersected from opening to opening";
+    "stored-pvs", |scene| matches!(scene.regions, Regions::Leaves(_)), Guarantee::Unproven,
         "the row of the eye's region in the map's own table";
-    "reject", Source::Reject, Guarantee::Unproven,
+    "reject", has_sectors, Guarantee::Unproven,
         "the row of the eye's sector in the map's REJECT table";
 };
 
-impl BackEnd {
-    /// Tests whether a scene has the regions that the back end needs.
-    pub fn is_for(&self, scene: &Scene) -> bool {
-        match (&scene.regions, self.build) {
-            (Regions::Tiling(_), Source::PortalRect) | (Regions::Leaves(_), Source::Claim) => true,
-            (Regions::Bsp(map), Source::PortalRect | Source::Reject) => map.disputes().is_empty(),
-            _ => false,
-        }
-    }
-}
-
-/// A back end over a graph.
-#[derive(Clone, Debug)]
-pub struct RegionRow {
-    /// Its row of the table.
-    pub back_end: BackEnd,
-    /// The graph that it searches.
-    pub graph: Arc<RegionGraph>,
-    /// Stored pairs; `None` for a search.
-    pub pvs: Option<Arc<Pvs>>,
+fn has_sectors(scene: &Scene) -> bool {
+    matches!(&scene.regions, Regions::Bsp(map) if map.disputes().is_empty())
 }
 
 /// Memory that queries use again and again.
@@ -116,42 +85,36 @@ pub struct Scratch {
     search: Search,
 }
 
-impl RegionRow {
-    /// A back end that searches, or reads stored pairs of as many regions.
-    pub fn of(source: Source, graph: &Arc<RegionGraph>, pvs: Option<Arc<Pvs>>) -> RegionRow {
-        let row = BACK_ENDS.iter().find(|row| row.build == source);
-        RegionRow {
-            back_end: *row.expect("a row for every source"),
-            graph: graph.clone(),
-            pvs,
-        }
-    }
-
+impl RegionGraph {
     /// Replaces `out` by the regions that a camera may see, ascending.
     ///
-    /// Returns `false`, with all regions in `out`, if the eye is not wholly in regions or the
+    /// By stored pairs of as many regions, or by a search without them. Returns `false`, with all regions in `out`, if the eye is not wholly in regions or the
     /// lens is orthographic.
-    #[allow(clippy::wrong_self_convention)] // Regions seen from an eye, not a conversion.
-    pub fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> bool {
-        let graph = &*self.graph;
+    pub fn seen_by(
+        &self,
+        rays: &Rays,
+        pvs: Option<&Pvs>,
+        scratch: &mut Scratch,
+        out: &mut Vec<RegionId>,
+    ) -> bool {
         let Scratch {
             homes,
             seen,
             search,
         } = scratch;
         out.clear();
-        if !graph.homes(rays, homes) {
-            out.extend(0..graph.len() as u32);
+        if !self.homes(rays, homes) {
+            out.extend(0..self.len() as u32);
             return false;
         }
-        if let (Some(pvs), [home]) = (&self.pvs, &homes[..]) {
+        if let (Some(pvs), [home]) = (pvs, &homes[..]) {
             extend(out, pvs.row(*home));
             return true;
         }
-        seen.clear(graph.len());
-        match &self.pvs {
+        seen.clear(self.len());
+        match pvs {
             Some(pvs) => seen.insert_all(homes.iter().flat_map(|&home| pvs.row(home))),
-            None => search.run(graph, rays, homes, seen),
+            None => search.run(self, rays, homes, seen),
         }
         seen.list(out);
         true

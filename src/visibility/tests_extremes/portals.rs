@@ -2,8 +2,6 @@
 //!
 //! The eye is as close to the first opening as f64 allows.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::case::looking;
@@ -11,7 +9,7 @@ use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::region::{
-    Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Source, leads_through, rectangle,
+    Opening, OpeningPlane, RegionGraph, Scratch, leads_through, rectangle,
 };
 
 /// A chain of rooms along x, and a line of sight from the first to the last.
@@ -77,13 +75,10 @@ impl Chain {
             .iter()
             .map(|opening| narrower(*opening, shrink));
         let narrow = RegionGraph::of_boxes(self.rooms.clone(), narrow.collect());
-        let (row, mut listed) = (
-            RegionRow::of(Source::PortalRect, &Arc::new(narrow), None),
-            Vec::new(),
-        );
-        row.from_eye(&self.rays, &mut Scratch::default(), &mut listed);
+        let mut listed = Vec::new();
+        narrow.seen_by(&self.rays, None, &mut Scratch::default(), &mut listed);
         let is_lost = |room: &u32| listed.binary_search(room).is_err();
-        Some((row.back_end.name, (0..=last).filter(is_lost).collect()))
+        Some(("portal-rect", (0..=last).filter(is_lost).collect()))
     }
 }
 

@@ -8,9 +8,9 @@ use super::follow;
 use super::worlds::*;
 use crate::scene::{Scene, SeededRng, load};
 
-fn sample(scene: &Scene) -> (Arc<DoomMap>, Arc<RegionGraph>) {
+fn sample(scene: &Scene) -> (Arc<DoomMap>, RegionGraph) {
     let map = DoomMap::of_scene(scene).unwrap();
-    let graph = Arc::new(map.graph().unwrap());
+    let graph = map.graph().unwrap();
     (map, graph)
 }
 
@@ -19,11 +19,8 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
     for name in ["freedm-map12", "freedm-map20"] {
         let scene = load(name, &Default::default()).unwrap();
         let (map, graph) = sample(&scene);
-        let reject = Arc::new(map.reject().unwrap());
-        let rows = [
-            RegionRow::of(Source::PortalRect, &graph, None),
-            RegionRow::of(Source::Reject, &graph, Some(reject)),
-        ];
+        let reject = map.reject().unwrap();
+        let pairs = [None, Some(&reject)];
         let mut rng = SeededRng::new(8);
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
         let (mut sums, mut seen_sum) = ([0; 2], 0);
@@ -38,13 +35,13 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
             let mut truth = Vec::new();
             seen.list(&mut truth);
             seen_sum += truth.len();
-            for (sum, row) in sums.iter_mut().zip(&rows) {
-                row.from_eye(&rays, &mut scratch, &mut out);
+            for (sum, pairs) in sums.iter_mut().zip(pairs) {
+                graph.seen_by(&rays, pairs, &mut scratch, &mut out);
                 let lost = truth
                     .iter()
                     .filter(|r| out.binary_search(r).is_err())
                     .count();
-                assert_eq!(lost, 0, "{name} {}", row.back_end.name);
+                assert_eq!(lost, 0, "{name} {pairs:?}");
                 *sum += out.len();
             }
         }
@@ -71,8 +68,8 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
     ] {
         let eye = (middle + right * away).extend(floor + height);
         let rays = looking(eye, &mut rng);
-        let (row, mut out) = (RegionRow::of(Source::PortalRect, &graph, None), Vec::new());
-        let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
+        let mut out = Vec::new();
+        let answer = graph.seen_by(&rays, None, &mut Scratch::default(), &mut out);
         assert_eq!(answer, place, "{away} {height}");
     }
 }

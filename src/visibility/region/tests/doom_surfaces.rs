@@ -18,7 +18,7 @@ const MAPS: [&str; 2] = ["freedm-map12", "freedm-map20"];
 struct World {
     scene: Scene,
     map: Arc<DoomMap>,
-    graph: Arc<RegionGraph>,
+    graph: RegionGraph,
     surfaces: Surfaces,
 }
 
@@ -26,7 +26,7 @@ fn world(name: &str) -> World {
     let scene = crate::scene::load(name, &Default::default()).unwrap();
     let map = DoomMap::of_scene(&scene).unwrap();
     World {
-        graph: Arc::new(map.graph().unwrap()),
+        graph: map.graph().unwrap(),
         surfaces: map.surfaces(&scene),
         scene,
         map,
@@ -34,10 +34,9 @@ fn world(name: &str) -> World {
 }
 
 /// Number of visible items, and of those missing in the answer of the search.
-fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (usize, usize) {
+fn visible_and_lost(world: &World, graph: &RegionGraph, eyes: usize) -> (usize, usize) {
     let index = SurfaceIndex::build(&world.surfaces);
     let items = RegionItems::of(graph, &world.scene);
-    let row = RegionRow::of(Source::PortalRect, graph, None);
     let mut rng = SeededRng::new(12);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
     let (mut marks, mut list) = (IdSet::default(), Vec::new());
@@ -48,7 +47,7 @@ fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (us
         let own = (world.scene.items.len()) as ItemId;
         let seen: Vec<ItemId> = truth.visible.into_iter().filter(|&id| id < own).collect();
         visible += seen.len();
-        row.from_eye(&rays, &mut scratch, &mut regions);
+        graph.seen_by(&rays, None, &mut scratch, &mut regions);
         items.of_regions(&regions, &mut marks, &mut list);
         let missing = seen.iter().filter(|id| list.binary_search(id).is_err());
         lost += missing.count();
@@ -100,7 +99,7 @@ fn a_graph_that_lacks_openings_is_caught() {
     let world = world("freedm-map12");
     let openings = world.graph.openings.len();
     let caught = |opening: &usize| {
-        let graph = Arc::new(without_opening(&world.graph, *opening));
+        let graph = without_opening(&world.graph, *opening);
         let (_, lost) = visible_and_lost(&world, &graph, 12);
         lost > 0
     };

@@ -1,7 +1,5 @@
 //! Search and stored rows from an eye against rays.
 
-use std::sync::Arc;
-
 use super::super::*;
 use super::follow;
 use super::worlds::*;
@@ -21,15 +19,15 @@ fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) 
     out
 }
 
-/// How many regions that rays pass are missing in the row's answers.
-pub fn missing(row: &RegionRow, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
+/// How many regions that rays pass are missing in the search's answers.
+pub fn missing(graph: &RegionGraph, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
     let mut rng = SeededRng::new(seed);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());
     let mut missing = 0;
     for _ in 0..eyes {
         let rays = eye_in(truth, &mut rng);
         let seen = sampled(truth, &rays, 500, &mut rng);
-        row.from_eye(&rays, &mut scratch, &mut out);
+        graph.seen_by(&rays, None, &mut scratch, &mut out);
         assert!(out.is_sorted());
         missing += seen
             .iter()
@@ -44,12 +42,11 @@ fn a_stored_row_answers_what_is_stored() {
     let (_, graph) = rooms("rooms:n=1600,seed=1");
     let (mut rng, mut scratch, mut homes) = (SeededRng::new(8), Scratch::default(), Vec::new());
     let some = Pvs::of_pairs(graph.len(), |from, to| (from * 7 + to * 3) % 5 < 2);
-    let pvs = Arc::new(some.unwrap());
-    let stored = RegionRow::of(Source::Claim, &graph, Some(pvs.clone()));
+    let pvs = some.unwrap();
     let [mut answer, mut wanted] = [Vec::new(), Vec::new()];
     for _ in 0..200 {
         let rays = eye_in(&graph, &mut rng);
-        let place = stored.from_eye(&rays, &mut scratch, &mut answer);
+        let place = graph.seen_by(&rays, Some(&pvs), &mut scratch, &mut answer);
         assert_eq!(graph.homes(&rays, &mut homes), place);
         let all = 0..graph.len() as u32;
         wanted.clear();
@@ -71,8 +68,7 @@ const WORLDS: [&str; 4] = [
 fn no_region_that_a_ray_passes_is_missed() {
     for world in WORLDS {
         let (_, graph) = rooms(world);
-        let row = RegionRow::of(Source::PortalRect, &graph, None);
-        assert_eq!(missing(&row, &graph, 60, 9), 0, "{world}");
+        assert_eq!(missing(&graph, &graph, 60, 9), 0, "{world}");
     }
 }
 
@@ -81,8 +77,7 @@ fn no_cube_that_a_ray_passes_is_missed() {
     let mut rng = SeededRng::new(17);
     for count in [[5, 1, 1], [4, 4, 1], [3, 3, 3], [2, 2, 4]] {
         let graph = cubes(count, &mut rng);
-        let row = RegionRow::of(Source::PortalRect, &graph, None);
-        assert_eq!(missing(&row, &graph, 60, 9), 0, "{count:?}");
+        assert_eq!(missing(&graph, &graph, 60, 9), 0, "{count:?}");
     }
 }
 
@@ -90,11 +85,7 @@ fn no_cube_that_a_ray_passes_is_missed() {
 fn a_forgotten_opening_is_noticed() {
     let (_, graph) = rooms(WORLDS[0]);
     for opening in [0, 20, 33] {
-        let wrong = RegionRow::of(
-            Source::PortalRect,
-            &Arc::new(without_opening(&graph, opening)),
-            None,
-        );
+        let wrong = without_opening(&graph, opening);
         assert!(missing(&wrong, &graph, 800, 9) > 0, "{opening}");
     }
 }
@@ -123,18 +114,14 @@ fn openings_with_a_thickness_are_seen_through() {
         ],
         ..Default::default()
     };
-    let graph = Arc::new(RegionGraph::of_tiling(&tiling, DVec3::splat(1e3)));
+    let graph = RegionGraph::of_tiling(&tiling, DVec3::splat(1e3));
     let answer = |forward: DVec3| {
         let eye = DVec3::splat(1e3) + 1.5;
         let frame = crate::camera::Frame::looking_along(eye, forward, DVec3::Z).unwrap();
         let lens = crate::camera::Lens::perspective(60.0, 1.0, 0.1, None).unwrap();
         let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        RegionRow::of(Source::PortalRect, &graph, None).from_eye(
-            &rays,
-            &mut Scratch::default(),
-            &mut out,
-        );
+        graph.seen_by(&rays, None, &mut Scratch::default(), &mut out);
         out.len()
     };
     assert_eq!(answer(DVec3::X), 3);

@@ -1,7 +1,5 @@
 //! Items of regions against what rays meet.
 
-use std::sync::Arc;
-
 use super::super::*;
 use super::worlds::*;
 use crate::camera::{Camera, Frame, Lens};
@@ -13,10 +11,9 @@ use crate::visibility::{Rays, Solids};
 /// Eyes are anywhere, in walls too; the near plane is sometimes behind a wall.
 fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> usize {
     let (scene, _) = rooms(world);
-    let graph = Arc::new(graph_of(&scene));
+    let graph = graph_of(&scene);
     let solids = Solids::of(&scene);
     let items = RegionItems::of(&graph, &scene);
-    let row = RegionRow::of(Source::PortalRect, &graph, None);
     let mut rng = SeededRng::new(21);
     let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
     let (mut marks, mut list) = (IdSet::default(), Vec::new());
@@ -31,7 +28,7 @@ fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> 
         let hits: Vec<u32> = (0..30)
             .filter_map(|_| first_hit(&solids.boxes, &rays.through(rng.unit(), rng.unit())))
             .collect();
-        row.from_eye(&rays, &mut scratch, &mut regions);
+        graph.seen_by(&rays, None, &mut scratch, &mut regions);
         items.of_regions(&regions, &mut marks, &mut list);
         lost += hits
             .iter()

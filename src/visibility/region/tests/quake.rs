@@ -6,8 +6,7 @@ use super::follow;
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{Regions, Scene, load};
 use crate::visibility::Rays;
-use crate::visibility::region::{IdSet, Pvs, RegionGraph, RegionItems, RegionRow};
-use crate::visibility::region::{Scratch, Source};
+use crate::visibility::region::{IdSet, Pvs, RegionGraph, RegionItems, Scratch};
 
 fn rays(eye: [f64; 3], forward: DVec3) -> Rays {
     let frame = Frame::looking_along(eye.into(), forward, DVec3::Z).unwrap();
@@ -15,23 +14,21 @@ fn rays(eye: [f64; 3], forward: DVec3) -> Rays {
     Rays::of(&Camera { frame, lens }).unwrap()
 }
 
-fn two_rooms() -> (Scene, RegionRow) {
+fn two_rooms() -> (Scene, RegionGraph, Pvs) {
     let scene = load("tests/data/two_rooms.bsp", &Default::default()).unwrap();
     let Regions::Leaves(map) = &scene.regions else {
         panic!("no leaves");
     };
-    let graph = RegionGraph::of_quake(map).into();
-    let pvs = Pvs::of_quake(map).unwrap();
-    let row = RegionRow::of(Source::Claim, &graph, Some(pvs.into()));
-    (scene, row)
+    let (graph, pvs) = (RegionGraph::of_quake(map), Pvs::of_quake(map).unwrap());
+    (scene, graph, pvs)
 }
 
 #[test]
 fn a_region_sees_what_the_table_of_the_map_has() {
-    let (_, row) = two_rooms();
+    let (_, graph, pvs) = two_rooms();
     let seen_from = |eye| {
-        let mut out = Vec::new();
-        let place = row.from_eye(&rays(eye, DVec3::X), &mut Scratch::default(), &mut out);
+        let (rays, mut out) = (rays(eye, DVec3::X), Vec::new());
+        let place = graph.seen_by(&rays, Some(&pvs), &mut Scratch::default(), &mut out);
         (place, out)
     };
     let inside = true;
@@ -44,7 +41,7 @@ fn a_region_sees_what_the_table_of_the_map_has() {
 
 #[test]
 fn rays_tell_that_the_table_lacks_the_second_room() {
-    let (scene, _) = two_rooms();
+    let (scene, ..) = two_rooms();
     let Regions::Leaves(map) = &scene.regions else {
         panic!("no leaves");
     };
@@ -66,8 +63,8 @@ fn rays_tell_that_the_table_lacks_the_second_room() {
 
 #[test]
 fn items_belong_to_the_regions_that_they_touch() {
-    let (scene, row) = two_rooms();
-    let items = RegionItems::of(&row.graph, &scene);
+    let (scene, graph, _) = two_rooms();
+    let items = RegionItems::of(&graph, &scene);
     let regions_of = |label: &str| -> Vec<Vec<u32>> {
         let labelled = (0..scene.items.len()).filter(|&i| scene.labels[0].get(i) == label);
         let holds = |item: usize, region: u32| items.of_region(region).contains(&(item as u32));

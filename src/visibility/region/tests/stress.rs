@@ -2,8 +2,6 @@
 //!
 //! Eyes are on and next to openings.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::super::*;
@@ -83,7 +81,7 @@ fn lost(shrink: f64) -> (usize, usize) {
             continue;
         }
         accepted += 1;
-        let told = Arc::new(RegionGraph::of_boxes(told.rooms, told.openings));
+        let told = RegionGraph::of_boxes(told.rooms, told.openings);
         let mut rng = SeededRng::new(round);
         let noise = DVec3::new(rng.unit(), rng.unit(), rng.unit()) * 0.3;
         let [eye, end] = truth.ends;
@@ -93,7 +91,7 @@ fn lost(shrink: f64) -> (usize, usize) {
         let lens = Lens::perspective(60.0, 1.3, 1e-4, Some(1e3)).unwrap();
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let (mut scratch, mut out) = (Scratch::default(), Vec::new());
-        RegionRow::of(Source::PortalRect, &told, None).from_eye(&rays, &mut scratch, &mut out);
+        told.seen_by(&rays, None, &mut scratch, &mut out);
         lost += usize::from(out.binary_search(&(length as u32 - 1)).is_err());
     }
     (lost, accepted)
@@ -115,17 +113,13 @@ fn openings_that_are_told_too_small_are_noticed() {
 #[test]
 fn an_orthographic_camera_and_one_with_a_far_plane() {
     let chain = chain(&mut SeededRng::new(3), DVec3::ZERO, 40, 0.0, &[1e-2]);
-    let graph = Arc::new(RegionGraph::of_boxes(chain.rooms, chain.openings));
+    let graph = RegionGraph::of_boxes(chain.rooms, chain.openings);
     let [eye, end] = chain.ends;
     let frame = Frame::looking_along(eye, end - eye, DVec3::new(0.3, 0.5, 0.7)).unwrap();
     let answer = |lens: Lens| {
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        let place = RegionRow::of(Source::PortalRect, &graph, None).from_eye(
-            &rays,
-            &mut Scratch::default(),
-            &mut out,
-        );
+        let place = graph.seen_by(&rays, None, &mut Scratch::default(), &mut out);
         (place, out.len())
     };
     let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();

@@ -1,7 +1,5 @@
 //! Small worlds and eyes in them.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::super::{Opening, OpeningPlane, RegionGraph, rectangle};
@@ -9,10 +7,10 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
 
-pub fn rooms(spec: &str) -> (Scene, Arc<RegionGraph>) {
+pub fn rooms(spec: &str) -> (Scene, RegionGraph) {
     let scene = scene::load(spec, &Default::default()).unwrap();
     let graph = RegionGraph::of_scene(&scene).unwrap();
-    (scene, Arc::new(graph))
+    (scene, graph)
 }
 
 /// A camera in a random region, its eye 1.7 above the floor where that is inside,
@@ -54,7 +52,7 @@ pub fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
 }
 
 /// Cubes in a block, with openings of all sizes and heights between most of them.
-pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> Arc<RegionGraph> {
+pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> RegionGraph {
     let number = |i: [usize; 3]| ((i[2] * count[1] + i[1]) * count[0] + i[0]) as u32;
     let (mut boxes, mut openings) = (Vec::new(), Vec::new());
     for z in 0..count[2] {
@@ -84,7 +82,7 @@ pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> Arc<RegionGraph> {
             }
         }
     }
-    Arc::new(RegionGraph::of_boxes(boxes, openings))
+    RegionGraph::of_boxes(boxes, openings)
 }
 
 /// A graph without one of its openings: wrong on purpose, to see who notices.
