@@ -3,6 +3,7 @@
 //! Builds share work among threads that they start; queries among [`Workers`], which stay.
 //! Callers define jobs and the order of results.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
@@ -62,6 +63,25 @@ pub fn share<J: Send>(
         }
         work_off();
     });
+}
+
+/// Results of jobs in their order, done as [`share`] does them.
+///
+/// # Panics
+/// If a job does.
+pub fn map<J: Send, R: Send>(
+    threads: usize,
+    jobs: impl Iterator<Item = J> + Send,
+    work: impl Fn(J) -> R + Sync,
+) -> Vec<R> {
+    let done = Mutex::new(BTreeMap::new());
+    share(threads, jobs.enumerate(), |(n, job)| {
+        let result = work(job);
+        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.insert(n, result);
+    });
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.into_values().collect()
 }
 
 /// A function for every thread: it does job after job until there is none left.

@@ -5,14 +5,13 @@
 //! query slower.
 
 use std::cmp::Ordering;
-use std::sync::{Mutex, PoisonError};
 
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, LANES};
 use crate::query::ItemId;
-use crate::threads::share;
+use crate::threads::{map, share};
 
 /// Order of the items of an implicit tree.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -120,14 +119,8 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
         if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
             break;
         }
-        let halves = Mutex::new(Vec::with_capacity(2 * open.len()));
-        share(threads.min(open.len()), open.into_iter(), |group| {
-            if let Some(two) = group.halved() {
-                let mut halves = halves.lock().unwrap_or_else(PoisonError::into_inner);
-                halves.extend(two);
-            }
-        });
-        open = halves.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let halves = map(threads.min(open.len()), open.into_iter(), Group::halved);
+        open = halves.into_iter().flatten().flatten().collect();
     }
     share(threads, open.into_iter(), Group::put_in_order);
     for (id, point) in ids.iter_mut().zip(&points) {

@@ -75,6 +75,13 @@ pub struct Findings {
 }
 
 impl Findings {
+    /// A camera that should have been made, for a reason.
+    pub fn without_case(reason: String) -> Findings {
+        let mut found = Findings::default();
+        found.fault([SCALAR, "camera"], None, "a camera with boxes", reason);
+        found
+    }
+
     /// Notes a check of a structure, or of the scalar loop, by a test.
     pub fn check(&mut self, subject: [&str; 2]) {
         self.checked.push(subject.map(str::to_owned));
@@ -175,14 +182,14 @@ impl Case {
     /// Checks every culling test and every structure. Structures are built over
     /// the first `share` items.
     pub fn check(&self, structures: &[StructureSpec], share: usize) -> Findings {
-        let verdicts = self.truth.verdicts().iter();
+        let verdicts = self.truth.verdicts.iter();
         let boxes = self.items.len() as u64;
         let mut found = Findings {
             boxes,
             tally: Tally {
                 boxes,
                 ties: verdicts.filter(|v| **v == Verdict::Touch).count() as u64,
-                errors: self.truth.visible(),
+                errors: self.truth.visible,
                 ..Tally::default()
             },
             ..Findings::default()
@@ -338,7 +345,7 @@ impl Case {
             "box {:?} to {:?} is {:?} by {:e}; {:?}, scene origin {:?}",
             b.min.to_array(),
             b.max.to_array(),
-            self.truth.verdicts()[item],
+            self.truth.verdicts[item],
             self.truth.depth(item, b),
             self.camera,
             DVec3::to_array(&self.around.origin),

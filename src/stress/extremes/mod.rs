@@ -7,7 +7,6 @@ mod check;
 mod volumes;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Mutex, PoisonError};
 
 use super::{Level, Row, Section, Status};
 use crate::camera::{Camera, Surroundings};
@@ -47,9 +46,6 @@ const FEW: usize = 256;
 /// Called with the family before each case; true leaves out the remaining cases.
 pub type Progress<'a> = &'a (dyn Fn(&str) -> bool + Sync);
 
-/// A case that was run: its seed, its group of rows, and its findings.
-type Outcome = (u64, String, Findings);
-
 /// Number of cases in all, for a progress bar.
 pub fn total(cases: u64) -> u64 {
     let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
@@ -70,21 +66,15 @@ impl Extremes<'_> {
         let mut section = Section::new(&format!("generated {}", family.name));
         for &variant in family.variants {
             let group = format!("{}/{}", family.name, (family.label)(variant));
-            let outcomes = self.run_cases(family.name, self.cases, progress, |nth, seed| {
+            let of = (family.name, Level::Camera);
+            self.add_cases(&mut section, of, self.cases, progress, |nth, seed| {
                 let has_all = nth.is_multiple_of(ALL_EVERY);
                 let share = if has_all { BOXES } else { FEW };
-                let findings = match camera_case(family, variant, seed) {
-                    Ok(case) => case.check(self.structures, share),
-                    Err(reason) => {
-                        let mut findings = Findings::default();
-                        let subject = [SCALAR, "camera"];
-                        findings.fault(subject, None, "a camera with boxes", reason);
-                        findings
-                    }
-                };
+                let case = camera_case(family, variant, seed);
+                let findings = case.map(|case| case.check(self.structures, share));
+                let findings = findings.unwrap_or_else(Findings::without_case);
                 (group.clone(), findings)
             });
-            self.gather(&mut section, Level::Camera, outcomes);
         }
         section
     }
@@ -92,7 +82,8 @@ impl Extremes<'_> {
     fn planes_family(&self, family: &PlanesFamily, progress: Progress) -> Section {
         let mut section = Section::new(&format!("generated {}", family.name));
         let cases = self.cases.saturating_mul(family.factor);
-        let outcomes = self.run_cases(family.name, cases, progress, |_, seed| {
+        let of = (family.name, Level::Planes);
+        self.add_cases(&mut section, of, cases, progress, |_, seed| {
             let case = (family.case)(seed);
             let group = match family.exact {
                 true => family.name.to_owned(),
@@ -100,34 +91,26 @@ impl Extremes<'_> {
             };
             (group, family.check(&case, self.structures))
         });
-        self.gather(&mut section, Level::Planes, outcomes);
         section
     }
 
-    /// Runs cases by their number and seed on all threads. The outcomes are in
-    /// the order of the seeds, whatever the number of threads.
-    fn run_cases(
+    /// Runs cases of a family by their number and seed on all threads.
+    ///
+    /// Adds a row for each fault with its seed, in the order of the seeds, and one for each
+    /// structure and test of a group without a fault.
+    fn add_cases(
         &self,
-        name: &str,
+        section: &mut Section,
+        (name, level): (&str, Level),
         cases: u64,
         progress: Progress,
         case: impl Fn(u64, u64) -> (String, Findings) + Sync,
-    ) -> Vec<Outcome> {
-        let done = Mutex::new(BTreeMap::new());
+    ) {
         let numbers = (0..cases).take_while(|_| !progress(name));
-        threads::share(self.threads, numbers, |nth| {
+        let outcomes = threads::map(self.threads, numbers, |nth| {
             let seed = self.seed.wrapping_add(nth);
-            let (group, findings) = case(nth, seed);
-            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-            done.insert(nth, (seed, group, findings));
+            (seed, case(nth, seed))
         });
-        let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        done.into_values().collect()
-    }
-
-    /// Adds a row for each fault with its seed, and one for each structure and
-    /// test of a group without a fault.
-    fn gather(&self, section: &mut Section, level: Level, outcomes: Vec<Outcome>) {
         let mut checked: BTreeMap<[String; 3], u64> = BTreeMap::new();
         let mut failed = BTreeSet::new();
         let row = |id, [structure, test]: [String; 2], status, expected, got: String| Row {
@@ -140,7 +123,7 @@ impl Extremes<'_> {
             got: got.into(),
             kernel: None,
         };
-        for (seed, group, findings) in outcomes {
+        for (seed, (group, findings)) in outcomes {
             section.cases += 1;
             section.boxes += findings.boxes;
             section.tally += findings.tally;

@@ -192,15 +192,9 @@ pub fn inner_boxes(
     most: usize,
     threads: usize,
 ) -> (Vec<(ItemId, Aabb)>, InnerRow) {
-    const CHUNK: usize = 16;
     let begun = Instant::now();
-    let mut found = vec![None; surfaces.items()];
-    let chunks = found.chunks_mut(CHUNK).enumerate();
-    threads::share(threads, chunks, |(chunk, found)| {
-        for (place, found) in found.iter_mut().enumerate() {
-            *found = inscribed_boxes(surfaces, chunk * CHUNK + place, cells, most);
-        }
-    });
+    let boxes_of = |item| inscribed_boxes(surfaces, item, cells, most);
+    let found = threads::map(threads, 0..surfaces.items(), boxes_of);
     let (mut boxes, mut boxed_count) = (Vec::new(), 0);
     let [mut inner, mut whole] = [0.0, 0.0];
     for (item, found) in (0..).zip(&found) {

@@ -13,7 +13,7 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox, load};
 use crate::visibility::truth::judge::{self, Depth};
-use crate::visibility::truth::{Boxes, NO_ITEM, RayIndex, SampleTruth};
+use crate::visibility::truth::{Boxes, NO_ITEM, RayIndex, SampleTruth, fronts};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 /// All items that the ray meets, by depth and id.
@@ -261,11 +261,12 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
             let rays = Rays::of(&camera).unwrap();
             let truth = SampleTruth::of(&index, &rays, grid, 1);
             items += truth.visible.len();
+            let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
             for row in 0..grid.height {
                 for column in 0..grid.width {
                     let picked = wide.first(&rays.sample(grid, column, row));
                     let picked = picked.unwrap_or(NO_ITEM);
-                    let front = truth.front[(row * grid.width + column) as usize];
+                    let front = fronts[(row * grid.width + column) as usize];
                     assert_eq!(picked, front, "{name} {column} {row}");
                 }
             }

@@ -28,10 +28,10 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let truth = truth.expect("no limit");
         assert_eq!(drawn.visible(&canvas), truth.visible);
         let (ids, solid) = (drawn.ids(), solid.ids());
-        assert_eq!(ids, truth.front);
+        assert_eq!(ids, fronts(&index, &opaque, &rays, GRID));
         for (sample, &id) in ids.iter().enumerate() {
             let probe = &canvas.probes[sample];
-            let mut along = index.all_along(probe.ray());
+            let mut along = index.all_along(&probe.ray);
             along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
             let opaque =
                 |item: ItemId, at| surfaces.opaque(item, &solids.boxes[item as usize], probe, at);
@@ -92,7 +92,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
         let (masked, open) = (masked.front[sample], open.front[sample]);
         assert_eq!(masked, open.filter(|_| stencil.marked[sample]));
         // Marked is what sees the portal, and no wall or pillar before it.
-        let ray = canvas.probes[sample].ray();
+        let ray = &canvas.probes[sample].ray;
         let entry = |b: &WorldBox| judge::entry(ray, b);
         let before = |portal: &judge::Depth| {
             let room = boxes[..first_beyond].iter().filter_map(entry);

@@ -3,7 +3,8 @@
 use super::judge;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SolidBox, visible_by_random_rays};
+use crate::visibility::truth::visible_by_random_rays;
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SolidBox, fronts};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 #[test]
@@ -20,7 +21,8 @@ fn worlds_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let grid = SampleGrid::new(8, 6);
         let truth = SampleTruth::of(&index, &rays, grid, 1);
         let mut samples = vec![0; boxes.len()];
-        for (place, &front) in truth.front.iter().enumerate() {
+        let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
+        for (place, front) in fronts.into_iter().enumerate() {
             let ray = rays.sample(grid, place as u32 % 8, place as u32 / 8);
             let wanted = judge::front(&ray, &boxes);
             let of_ray = index.front_of(&ray).front;
@@ -142,7 +144,8 @@ fn a_scene_of_nothing_and_of_one() {
     assert!(of(&[]).visible.is_empty());
     let at = |x: f64| crate::scene::WorldBox::around(glam::DVec3::X * x, glam::DVec3::splat(1.0));
     assert_eq!(of(&[at(3.0)]).samples_of, [1]);
-    assert_eq!(of(&[at(1.5)]).front[4], 0, "it begins at the near plane");
+    let begins_at_near = RayIndex::build(&judge::solids(&[at(1.5)]));
+    assert_eq!(fronts(&begins_at_near, &|_, _, _| true, &rays, grid)[4], 0);
     assert!(
         of(&[at(1.25)]).visible.is_empty(),
         "entered before the near plane"

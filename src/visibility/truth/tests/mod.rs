@@ -8,7 +8,7 @@ use super::{Body, BodyIndex, Front, SampleTruth};
 use crate::query::{ItemId, distinct};
 use crate::scene::SeededRng;
 use crate::threads;
-use crate::visibility::{Rays, SampleGrid};
+use crate::visibility::{Ray, Rays, SampleGrid};
 
 impl SampleTruth {
     /// Follows every ray of the grid through bodies without holes.
@@ -21,6 +21,26 @@ impl SampleTruth {
         let all = SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads, u64::MAX);
         all.expect("no limit")
     }
+}
+
+/// In place of an item where a ray meets nothing.
+pub const NO_ITEM: ItemId = ItemId::MAX;
+
+/// The front item of each sample, row by row from the top left.
+///
+/// The lowest of a tie, [`NO_ITEM`] where there is none.
+pub fn fronts<B: Body>(
+    index: &BodyIndex<B>,
+    is_opaque: &impl Fn(&B, &B::Probe, &B::At) -> bool,
+    rays: &Rays,
+    grid: SampleGrid,
+) -> Vec<ItemId> {
+    let mut seen = Front::new();
+    let front = |ray: Ray| {
+        seen.search(index, &ray, is_opaque);
+        seen.front.first().copied().unwrap_or(NO_ITEM)
+    };
+    rays.of_grid(grid).map(front).collect()
 }
 
 /// Items visible along any of `count` seeded random rays through the window.
