@@ -121,9 +121,6 @@ pub trait Along: Copy {
     /// A point of the ray on the surface of a body.
     type At: Copy + Debug;
 
-    /// The ray as it was given.
-    fn ray(&self) -> &Ray;
-
     /// Exact order of two such points along the ray.
     fn compare(&self, a: &Self::At, b: &Self::At) -> Ordering;
 

@@ -8,7 +8,7 @@ use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, mix64};
 use crate::spec::values::choice;
 use crate::spec::{Spec, SpecError};
-use crate::visibility::truth::{Along, Crossing, Probe};
+use crate::visibility::truth::{Crossing, Probe};
 
 named! {
     /// Pattern of the opaque parts of a surface.
@@ -65,7 +65,7 @@ impl Holes {
         let Some(Some(surface)) = self.of_item.get(item as usize) else {
             return true;
         };
-        let place = (probe.ray().at(at.depth) - b.min) / surface.tile;
+        let place = (probe.ray.at(at.depth) - b.min) / surface.tile;
         let [u, v] = match at.axis {
             0 => [place.y, place.z],
             1 => [place.x, place.z],

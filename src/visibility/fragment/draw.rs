@@ -121,7 +121,7 @@ impl<B: Drawable> Drawn<B> {
             let item = body.item();
             let place = body.rectangle(canvas);
             let [tested, kept_out] = canvas.scan(place, tests.stencil, |sample, probe| {
-                let Some(at) = body.meet(probe, probe.ray().far) else {
+                let Some(at) = body.meet(probe, f64::INFINITY) else {
                     return;
                 };
                 self.tally.fragment_count += 1;
@@ -208,7 +208,7 @@ impl Drawn {
                     let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
                     self.front[sample].is_none_or(before)
                 };
-                let entered = probe.enter(rectangle, probe.ray().far);
+                let entered = probe.enter(rectangle, f64::INFINITY);
                 marked[sample] |= entered.is_some_and(is_before);
             });
             tested += asked;
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
     use crate::scene::{self, SeededRng};
     use crate::visibility::fragment::tests::cameras;
-    use crate::visibility::truth::{NO_ITEM, SampleTruth, SurfaceIndex, judge};
+    use crate::visibility::truth::{NO_ITEM, SampleTruth, SurfaceIndex, fronts, judge};
     use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
 
     impl<B: Body> Drawn<B> {
@@ -261,12 +261,13 @@ mod tests {
         grid: SampleGrid,
     ) -> usize {
         let truth = SampleTruth::of(index, rays, grid, 1);
+        let fronts = fronts(index, &|_, _, _| true, rays, grid);
         let canvas = Canvas::about(rays, grid, surfaces.origin);
         let mut triangles: Vec<u32> = (0..surfaces.triangles.len() as u32).collect();
         let mut drawn = Drawn::new(grid.samples());
         for turn in 0..2 {
             drawn.draw_triangles(&canvas, surfaces, &triangles);
-            assert_eq!(drawn.ids(), truth.front, "{turn} {surfaces:?}");
+            assert_eq!(drawn.ids(), fronts, "{turn} {surfaces:?}");
             assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
             assert!(drawn.tally.shaded_count >= drawn.tally.covered_count);
             triangles.reverse();

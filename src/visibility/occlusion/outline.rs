@@ -53,7 +53,7 @@ struct Bound {
 const WHOLE_NUMBERS: f32 = (1u32 << 23) as f32;
 
 /// The pixels that a box covers and how near it is there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Default, Debug)]
 pub struct Outline {
     /// First `lower` bounds from below, then `upper` ones from above, of columns.
     lower: [Bound; 8],
@@ -96,18 +96,13 @@ impl Outline {
         }
         let [columns, height] = view.padded;
         let mut outline = Outline {
-            lower: Default::default(),
-            lower_count: 0,
-            upper: Default::default(),
-            upper_count: 0,
             height,
             rows: [0.0, height],
             columns_within: [0.0, columns],
             faces: [Linear::constant(f64::INFINITY); 3],
-            face_count: 0,
-            floor: 0.0,
             columns,
             covers_whole,
+            ..Outline::default()
         };
         match view.parallel {
             true => outline.add_parallel(low, high, view),

@@ -84,12 +84,8 @@ impl OccluderScene {
         });
         let by_number: Vec<(ItemId, Occluder)> = by_number.collect();
         let mut ids: Vec<ItemId> = (0..outer.len() as ItemId).collect();
-        let mut capacity = LANES;
-        while capacity < ids.len() {
-            capacity *= LANES;
-        }
         let centres: Vec<_> = outer.iter().map(Aabb::centre).collect();
-        sort_into(&mut ids, capacity, &centres);
+        sort_into(&mut ids, LANES.pow(8), &centres);
         let mut levels: Vec<BoxBlocks> = vec![ids.iter().map(|&id| &outer[id as usize]).collect()];
         while let Some(last) = levels.last().filter(|last| last.blocks().len() > 1) {
             let unions: Vec<Aabb> = last.blocks().iter().map(BoxBlock::union).collect();

@@ -21,7 +21,7 @@ pub const TILE_WIDTH: usize = 8;
 pub const TILE_HEIGHT: usize = 4;
 
 /// `x * a + y * b + c` over the image.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Linear {
     /// Per column.
     pub x: f64,

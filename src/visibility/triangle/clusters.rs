@@ -14,6 +14,7 @@ use obvhs::ploc::morton::morton_encode_u64;
 use super::exact::{Eye, faces, normal};
 use crate::geometry::Aabb;
 use crate::kernel::each;
+use crate::query::Bits;
 use crate::scene::Surfaces;
 
 /// Most triangles of a cluster: the bits of a word.
@@ -88,10 +89,18 @@ impl Clusters {
         self.surfaces.two_sided[self.triangles_of(cluster)[0] as usize]
     }
 
-    /// Exact: returns `true` if a triangle has two sides or the eye sees its front.
-    pub fn is_seen(&self, eye: &Eye, cluster: usize, bit: usize) -> bool {
-        let corners = || self.surfaces.corners(self.triangles_of(cluster)[bit]);
-        self.is_two_sided(cluster) || faces(eye, corners())
+    /// Those of some triangles of a cluster that have two sides or turn their front to the eye.
+    ///
+    /// Exact; one predicate per triangle.
+    #[inline(never)]
+    pub fn seen(&self, eye: &Eye, cluster: usize, word: u64) -> u64 {
+        let corners = |bit: u32| {
+            self.surfaces
+                .corners(self.triangles_of(cluster)[bit as usize])
+        };
+        let is_seen = |bit: &u32| self.is_two_sided(cluster) || faces(eye, corners(*bit));
+        let seen = Bits(word).filter(is_seen);
+        seen.fold(0, |word, bit| word | 1 << bit)
     }
 }
 

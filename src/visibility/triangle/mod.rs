@@ -10,7 +10,6 @@ mod per_triangle;
 use std::sync::Arc;
 
 use crate::kernel::{Kernel, LANES};
-use crate::query::Bits;
 use crate::visibility::{Guarantee, Row};
 
 pub use clusters::{Clusters, MOST_TRIANGLES};
@@ -85,18 +84,6 @@ impl Selection {
         let pairs = self.words().iter().zip(other.words());
         pairs.map(|(a, b)| (a & !b).count_ones() as usize).sum()
     }
-
-    /// Keeps the triangles for which `keep(cluster, bit)` is true.
-    #[inline(always)]
-    pub fn retain(&mut self, mut keep: impl FnMut(usize, usize) -> bool) {
-        for (cluster, word) in self.words_mut().iter_mut().enumerate() {
-            for bit in Bits(*word) {
-                if !keep(cluster, bit as usize) {
-                    *word &= !(1 << bit);
-                }
-            }
-        }
-    }
 }
 
 /// A back end, built for certain clusters.
@@ -114,6 +101,8 @@ pub type TriangleRow = Row<fn(&Arc<Clusters>) -> Box<dyn TriangleCull>>;
 /// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
 pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selection {
     let mut truth = candidates.clone();
-    truth.retain(|cluster, bit| clusters.is_seen(eye, cluster, bit));
+    for (cluster, word) in truth.words_mut().iter_mut().enumerate() {
+        *word = clusters.seen(eye, cluster, *word);
+    }
     truth
 }

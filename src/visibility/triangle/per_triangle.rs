@@ -19,7 +19,6 @@ use super::exact::{Eye, normal};
 use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
-use crate::query::Bits;
 
 /// Error per unit of the way: see above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
@@ -119,18 +118,11 @@ impl Work for Query<'_> {
             }
             let left = *word & doubt;
             if left != 0 {
-                front |= in_doubt(&all.clusters, cluster, left, eye);
+                front |= all.clusters.seen(eye, cluster, left);
             }
             *word &= front;
         }
     }
-}
-
-/// Those of some triangles of a cluster that the eye is in front of.
-#[cold]
-fn in_doubt(clusters: &Clusters, cluster: usize, left: u64, eye: &Eye) -> u64 {
-    let is_seen = |bit: u32| u64::from(clusters.is_seen(eye, cluster, bit as usize)) << bit;
-    Bits(left).fold(0, |front, bit| front | is_seen(bit))
 }
 
 /// The eye in all lanes.

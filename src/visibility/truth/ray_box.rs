@@ -38,18 +38,14 @@ pub struct Crossing {
 /// 2^400 in size.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    ray: Ray,
+    /// The ray as it was given.
+    pub ray: Ray,
     /// Infinite where the direction's component is zero, and not used there.
     inverse: [f64; 3],
 }
 
 impl Along for Probe {
     type At = Crossing;
-
-    #[inline(always)]
-    fn ray(&self) -> &Ray {
-        &self.ray
-    }
 
     #[inline]
     fn compare(&self, a: &Crossing, b: &Crossing) -> Ordering {

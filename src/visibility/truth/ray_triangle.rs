@@ -74,11 +74,6 @@ pub struct TriangleProbe {
 impl Along for TriangleProbe {
     type At = Meeting;
 
-    #[inline(always)]
-    fn ray(&self) -> &Ray {
-        &self.ray
-    }
-
     #[inline]
     fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
         if Self::at_most(a) < b.at_least() {
