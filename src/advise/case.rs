@@ -114,11 +114,8 @@ impl<'a> Case<'a> {
 
 /// Evenly spread boxes of a scene about another origin, rounded outward once more.
 pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
-    let at_home = |corner: Vec3| scene.origin + corner.as_dvec3();
-    let boxes = evenly(scene.items.len(), count).map(|id| WorldBox {
-        min: at_home(scene.items[id].min),
-        max: at_home(scene.items[id].max),
-    });
+    let boxes = evenly(scene.items.len(), count);
+    let boxes = boxes.map(|id| WorldBox::of(&scene.items[id], scene.origin));
     let boxes: Vec<WorldBox> = boxes.collect();
     Ok(Scene {
         up: scene.up,

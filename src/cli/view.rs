@@ -195,7 +195,7 @@ fn fates(
     let (returned, in_front) = (set(answer), front.map(set));
     let fate = |item: usize| {
         let is_hidden = in_front.as_ref().is_some_and(|front| !front[item]);
-        match (returned[item], truth.map(|truth| truth.verdicts()[item])) {
+        match (returned[item], truth.map(|truth| truth.verdicts[item])) {
             (true, Some(Verdict::Out)) => Fate::FalsePositive,
             (true, _) if is_hidden => Fate::Hidden,
             (true, _) => Fate::Visible,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::stage::{StageKind, Step};
 use super::world::FunnelInput;
-use crate::measure::{Ask, OverProcesses, ProcessTimes, StudyPlan, TimedTask};
+use crate::measure::{Ask, ProcessTimes, StudyPlan, TimedTask};
 use crate::visibility::fragment::DrawOrder;
 
 named! {
@@ -68,12 +68,6 @@ impl FunnelPlan {
     pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
         let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
         let ask = |key: &FunnelKey| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
-        ProcessTimes::of(&self.timed(&input.setting.protocol, ask))
-    }
-
-    /// Times of all processes.
-    pub fn times(&self, processes: &[ProcessTimes]) -> OverProcesses<FunnelKey> {
-        let keys = self.tasks.iter().map(|(key, _)| key.clone());
-        OverProcesses::keyed(keys.collect(), processes)
+        self.timed(&input.setting.protocol, ask)
     }
 }

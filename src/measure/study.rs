@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, Protocol, Schedule, Timed, TimedTask, Verdict, timed};
+use super::{Ask, OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
 use crate::index::StructureSpec;
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -40,15 +40,23 @@ impl<K> StudyPlan<K> {
         }
     }
 
-    /// Times the tasks in this process, answered by what `ask` gives for their keys.
+    /// Times of the tasks in this process, answered by what `ask` gives for their keys.
     pub fn timed<'a>(
         &self,
         protocol: &Protocol,
         mut ask: impl FnMut(&K) -> Ask<'a>,
-    ) -> Vec<Result<Timed, Verdict>> {
+    ) -> ProcessTimes {
         let tasks = self.tasks.iter();
         let tasks = tasks.map(|(key, expected)| TimedTask::new(expected.clone(), ask(key)));
         let tasks: Vec<_> = tasks.collect();
-        timed(&tasks, &self.schedule, protocol, &|_| ())
+        ProcessTimes::of(&timed(&tasks, &self.schedule, protocol, &|_| ()))
+    }
+}
+
+impl<K: Clone + PartialEq> StudyPlan<K> {
+    /// Times of all processes.
+    pub fn times(&self, processes: &[ProcessTimes]) -> OverProcesses<K> {
+        let keys = self.tasks.iter().map(|(key, _)| key.clone());
+        OverProcesses::keyed(keys.collect(), processes)
     }
 }

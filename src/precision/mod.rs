@@ -6,7 +6,6 @@
 mod judged;
 mod point;
 mod points;
-mod size;
 mod sweeps;
 
 pub use judged::Names;

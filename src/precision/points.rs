@@ -11,9 +11,7 @@ use super::sweeps::SweepRow;
 use crate::camera::{Camera, PLANE_METHODS, PlaneOptions};
 use crate::culling::{Arithmetic, Culling, CullingTest};
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{
-    OverProcesses, ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_for,
-};
+use crate::measure::{ProcessTimes, Setting, Status, StudyPlan, TimedTask, Verdict, input_for};
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
@@ -257,21 +255,18 @@ pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessT
     let cameras = setting.path.clone().at_most(most.max(1)).cameras;
     let built = Built::new(setting, &cameras, &[])?;
     let ways = built.ways();
-    let timed = plan.timed(&setting.protocol, |&(way, _)| {
+    Ok(plan.timed(&setting.protocol, |&(way, _)| {
         let way = ways[way];
         Box::new(move |n, out| way.answer(n, out))
-    });
-    Ok(ProcessTimes::of(&timed))
+    }))
 }
 
 impl Prepared {
     /// The diagram from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
-        let (mut precision, tasks) = (self.precision, self.plan.tasks);
-        let keys: Vec<(usize, bool)> = tasks.into_iter().map(|(key, _)| key).collect();
-        let twin = keys.iter().find(|key| key.1).map(|key| key.0);
-        let times = OverProcesses::keyed(keys, processes);
-        precision.twin = twin.and_then(|way| times.ratio((way, true), (way, false)));
+        let (mut precision, times) = (self.precision, self.plan.times(processes));
+        let twin = self.plan.tasks.iter().find(|(key, _)| key.1);
+        precision.twin = twin.and_then(|&((way, _), _)| times.ratio((way, true), (way, false)));
         let points = &mut precision.points;
         for (way, point) in points.iter_mut().enumerate() {
             point.time(&times, way, precision.items);

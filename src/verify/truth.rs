@@ -18,8 +18,10 @@ pub struct Truth {
     /// About the boxes as they were written, in the world, where the two
     /// differ.
     written: Option<(Oracle, Originals)>,
-    verdicts: Vec<Verdict>,
-    visible: ErrorCount,
+    /// About every item, by id.
+    pub verdicts: Vec<Verdict>,
+    /// Counts of the visible items, and no errors yet.
+    pub visible: ErrorCount,
 }
 
 /// How answers differ from the truth: sums over items and cameras.
@@ -141,8 +143,8 @@ impl Truth {
             visible: ErrorCount::default(),
         };
         for (id, item) in items.iter().enumerate() {
-            let judgement = match truth.written.as_ref().zip(truth.original(id)) {
-                Some(((world, _), b)) => world.judge_wide(b.min, b.max),
+            let judgement = match truth.as_written(id) {
+                Some((world, b)) => world.judge_wide(b.min, b.max),
                 None => truth.oracle.judge(item),
             };
             truth.visible.visible += u64::from(judgement.verdict != Verdict::Out);
@@ -154,25 +156,21 @@ impl Truth {
 
     /// How deep item `id` reaches into the volume, as it was written.
     pub fn depth(&self, id: usize, item: &Aabb) -> f64 {
-        match self.written.as_ref().zip(self.original(id)) {
-            Some(((world, _), b)) => world.depth_wide(b.min, b.max),
+        match self.as_written(id) {
+            Some((world, b)) => world.depth_wide(b.min, b.max),
             None => self.oracle.depth(item),
         }
     }
 
+    /// The box of item `id` as it was written and its oracle, where f32 has changed boxes.
+    fn as_written(&self, id: usize) -> Option<(&Oracle, &WorldBox)> {
+        let (world, originals) = self.written.as_ref()?;
+        Some((world, originals.of_item(id)?))
+    }
+
     /// The box of item `id` as it was written, where f32 has changed boxes.
     pub fn original(&self, id: usize) -> Option<&WorldBox> {
-        self.written.as_ref()?.1.of_item(id)
-    }
-
-    /// About every item, by id.
-    pub fn verdicts(&self) -> &[Verdict] {
-        &self.verdicts
-    }
-
-    /// Counts of the visible items, and no errors yet.
-    pub fn visible(&self) -> ErrorCount {
-        self.visible
+        Some(self.as_written(id)?.1)
     }
 
     /// Every item of the truth: its id, its verdict, and whether it is in the answer.
