@@ -230,7 +230,9 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
     rows
 }
 
-/// Tests of the fragment stage; each tells whether a scene has what it needs, with holes or not.
+/// Tests of the fragment stage.
+///
+/// Each tells whether a scene has what it needs; with `true` some items have holes.
 const FRAGMENT_ROWS: &[FragmentRow] = rows! { FragmentRow { name, guarantee, summary, build }
     Z, Guarantee::SampleExact, "the nearest fragment of each sample, exactly",
         |_, has_cut_outs| !has_cut_outs;

@@ -384,7 +384,9 @@ impl Regions {
         })
     }
 
-    /// The stored pairs that a back end reads, none for a search; `None` if the map lacks them.
+    /// The stored pairs that a back end reads, none for a search.
+    ///
+    /// `None` if the map lacks them.
     pub fn pairs(&self, name: &str) -> Option<Option<&Pvs>> {
         match name {
             PORTAL_RECT => Some(None),

@@ -162,7 +162,9 @@ impl Truth {
         }
     }
 
-    /// The box of item `id` as it was written and its oracle, where f32 has changed boxes.
+    /// The box of an item as it was written, with the oracle of such boxes.
+    ///
+    /// `None` where f32 has not changed it.
     fn as_written(&self, id: usize) -> Option<(&Oracle, &WorldBox)> {
         let (world, originals) = self.written.as_ref()?;
         Some((world, originals.of_item(id)?))

@@ -57,10 +57,10 @@ impl Pvs {
     }
 }
 
-/// A row of the table of back ends; tells whether a scene has the regions that it needs.
+/// A row of the table of back ends.
 ///
-/// The guarantee is of answers from an eye in the world of regions and openings (hiding by
-/// items aside).
+/// It tells whether a scene has the regions that it needs. The guarantee is of answers from
+/// an eye in the world of regions and openings (hiding by items aside).
 pub type BackEnd = Row<fn(&Scene) -> bool>;
 
 /// All back ends of the region stage.
@@ -88,8 +88,8 @@ pub struct Scratch {
 impl RegionGraph {
     /// Replaces `out` by the regions that a camera may see, ascending.
     ///
-    /// By stored pairs of as many regions, or by a search without them. Returns `false`, with all regions in `out`, if the eye is not wholly in regions or the
-    /// lens is orthographic.
+    /// Reads stored pairs of as many regions, or searches without them. Returns `false`, with
+    /// all regions in `out`, if the eye is not wholly in regions or the lens is orthographic.
     pub fn seen_by(
         &self,
         rays: &Rays,

@@ -89,9 +89,9 @@ impl Clusters {
         self.surfaces.two_sided[self.triangles_of(cluster)[0] as usize]
     }
 
-    /// Those of some triangles of a cluster that have two sides or turn their front to the eye.
+    /// The triangles, of some of a cluster, that the eye sees the front of.
     ///
-    /// Exact; one predicate per triangle.
+    /// All of them where they have two sides. Exact; one predicate per triangle.
     #[inline(never)]
     pub fn seen(&self, eye: &Eye, cluster: usize, word: u64) -> u64 {
         let corners = |bit: u32| {
