@@ -65,7 +65,7 @@ fn written(stream: &Stream) -> Vec<u8> {
 /// Joins the run with nothing, and continues it.
 fn go_on(folder: &Path) {
     if let Some(merged) = read(merge(&[folder.to_owned()], (&[], ""))) {
-        read(merged.write(&folder.join("merged"), &|| false));
+        read(merged.write(&folder.join("merged"), &|| Ok(())));
     }
     if let Some((stopped, stream)) = read(StoppedRun::open(folder)) {
         assert!(stopped.lost == 0 || stream.finished_at.is_none());

@@ -1,7 +1,7 @@
 //! `cullbench advise`: the structure, the culling test and the work to leave out
 //! for a scene and path, with the evidence. The library measures and weighs it.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use super::args::AdviseArgs;
 use super::document::{Block, Column, Table, show};
@@ -45,11 +45,8 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
             ..Share::first(1)
         };
         let scene = Job::scene(0, share, false);
-        let part = |said| match said {
-            Message::Part(part, _) => Some(*part),
-            _ => None,
-        };
-        parts.extend(study.workers.found(process, scene, &begin, part)?);
+        let found = (study.workers).found(process, scene, &begin, Message::part);
+        parts.extend(found.with_context(|| format!("process {}", process + 1))?);
         study.bar.inc(1);
     }
     let prepared = advise::prepare(&input, Group::of(&parts).cells, &begin)?;

@@ -262,17 +262,10 @@ impl Duel<'_> {
             for side in [NEW, OLD] {
                 let mut share = self.share(scene, 0, [&seen[NEW], &[]]);
                 share.plan_only = true;
-                let own = &mut seen[side];
-                let mut keep = |said| {
-                    if let Message::Part(part, _) = said {
-                        own.push(*part);
-                    }
-                    Ok(())
-                };
                 let (workers, job) = (&self.sides[side], Job::scene(scene, share, false));
-                let ended = workers.see_through(0, job, &mut keep, &|_| ())?;
-                let named = || workers.program.display().to_string();
-                ended.done().with_context(named)?;
+                let parts = workers.found(0, job, &|_| (), Message::part);
+                let program = || workers.program.display().to_string();
+                seen[side].extend(parts.with_context(program)?);
             }
         }
         Ok(seen)
@@ -328,14 +321,10 @@ impl Duel<'_> {
                 workers[side].iter().for_each(|own| own.hold(true));
             }
             while let Some(worker) = &mut workers[side] {
-                match worker.listen(Duration::ZERO)? {
-                    Some(Ok(Message::Part(part, _))) => parts[side].push(*part),
-                    Some(Err(ended)) => {
-                        let program = || self.sides[side].program.display().to_string();
-                        ended.done().with_context(program)?;
-                        workers[side] = None;
-                    }
-                    Some(_) => {}
+                let program = || self.sides[side].program.display().to_string();
+                match worker.listen(Duration::ZERO).with_context(program)? {
+                    Some(Message::Done) => workers[side] = None,
+                    Some(said) => parts[side].extend(said.part()),
                     None => break,
                 }
             }

@@ -161,7 +161,7 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
             ExitCode::from(ending as u8)
         }
         Err(error) if error.is::<Interrupted>() => {
-            tell!("{error}");
+            tell!("{Interrupted}");
             ExitCode::from(Ending::Interrupted as u8)
         }
         // A reader who left is no failure.

@@ -36,30 +36,12 @@ const LONGEST: u64 = 1 << 29;
 /// Lines that wait to be read before the worker does.
 const WAITING: usize = 16;
 
-/// End of a share of the work.
-pub enum Ended {
-    Done,
-    /// A scene or a path that cannot be read.
-    Failed(String),
-    /// The process died at this structure, with this verdict.
-    Died(Option<String>, Verdict),
-}
-
-impl Ended {
-    /// # Errors
-    /// Any other end than that of the work.
-    pub fn done(self) -> anyhow::Result<()> {
-        match self {
-            Ended::Done => Ok(()),
-            Ended::Failed(reason) => bail!("{reason}"),
-            Ended::Died(structure, verdict) => {
-                let who = structure.map_or(String::new(), |structure| structure + ": ");
-                let why = verdict.reason.unwrap_or_default();
-                bail!("{who}{why}; expected one that finishes its work")
-            }
-        }
-    }
-}
+/// The process of a worker died at this structure, with this verdict.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}; expected one that finishes its work",
+    .0.as_ref().map_or(String::new(), |structure| format!("{structure}: ")),
+    .1.reason.as_deref().unwrap_or_default())]
+pub struct Died(pub Option<String>, pub Verdict);
 
 /// Between two looks at a worker; longer, and its parent was stopped.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
@@ -79,11 +61,12 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Waits for the next message or the end, told, seen or made; none within `wait`.
+    /// Waits for the next message; none within `wait`.
     ///
     /// # Errors
-    /// A message that no worker of this version sends.
-    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Result<Message, Ended>>> {
+    /// A message that no worker of this version sends, or that its scene cannot be had;
+    /// [`Died`], seen or made.
+    pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Message>> {
         let gap = std::mem::replace(&mut self.looked, Instant::now()).elapsed();
         self.waited += gap.min(LONGEST_GAP);
         let line = match self.lines.recv_timeout(wait) {
@@ -105,7 +88,7 @@ impl Worker {
                         &String::from_utf8_lossy(&words.unwrap_or_default()),
                     )
                 };
-                return Ok(Some(Err(Ended::Died(structure, verdict))));
+                return Err(Died(structure, verdict).into());
             }
         };
         self.waited = Duration::ZERO;
@@ -126,13 +109,10 @@ impl Worker {
                  version"
             ),
             Message::Doing { structure, step } => self.doing = (structure.clone(), step.clone()),
+            Message::Failed(reason) => bail!("{reason}"),
             _ => {}
         }
-        Ok(Some(match message {
-            Message::Failed(reason) => Err(Ended::Failed(reason)),
-            Message::Done => Err(Ended::Done),
-            message => Ok(message),
-        }))
+        Ok(Some(message))
     }
 
     fn kill(&mut self) {
@@ -232,14 +212,13 @@ impl Workers {
     /// # Errors
     /// The program cannot be started.
     pub fn start(&self, process: u32, layout: u64, job: Job) -> anyhow::Result<Worker> {
-        let cpu = process as usize % self.cpus.len().max(1);
         let request = Request {
             protocol: PROTOCOL,
             args: self.args.clone(),
             spooled: self.spooled.clone(),
             files: input::held_files(),
             job,
-            cpu: self.cpus.get(cpu).copied(),
+            cpu: self.cpus.iter().cycle().nth(process as usize).copied(),
             layout,
         };
         let mut command = Command::new(&self.program);
@@ -302,7 +281,7 @@ impl Workers {
     /// Runs a job in a separate process, on the next processor.
     ///
     /// # Errors
-    /// The program cannot be started or is of another version; what `keep` says;
+    /// The program cannot be started; those of [`Worker::listen`]; what `keep` says;
     /// [`interrupt::Interrupted`].
     pub fn see_through(
         &self,
@@ -310,27 +289,26 @@ impl Workers {
         job: Job,
         keep: &mut dyn FnMut(Message) -> anyhow::Result<()>,
         tell: &dyn Fn(&str),
-    ) -> anyhow::Result<Ended> {
+    ) -> anyhow::Result<()> {
         let mut worker = self.start(process, u64::from(process), job)?;
         loop {
             interrupt::check()?;
-            let place = || self.program.display().to_string();
-            match worker.listen(GLANCE).with_context(place)? {
-                Some(Ok(Message::Ready { .. })) => tell("started"),
-                Some(Ok(Message::Doing { structure, step })) => {
+            match worker.listen(GLANCE)? {
+                Some(Message::Ready { .. }) => tell("started"),
+                Some(Message::Doing { structure, step }) => {
                     tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());
                 }
-                Some(Ok(found)) => keep(found)?,
-                Some(Err(ended)) => return Ok(ended),
+                Some(Message::Done) => return Ok(()),
+                Some(found) => keep(found)?,
                 None => {}
             }
         }
     }
 
-    /// Runs a job that needs every process; what `pick` takes of its messages.
+    /// Runs a job; what `pick` takes of its messages.
     ///
     /// # Errors
-    /// The errors of [`Workers::see_through`]; a process that does not finish.
+    /// The errors of [`Workers::see_through`].
     pub fn found<T>(
         &self,
         process: u32,
@@ -343,9 +321,7 @@ impl Workers {
             found.extend(pick(said));
             Ok(())
         };
-        let ended = self.see_through(process, job, &mut keep, step)?;
-        let place = || format!("process {}", process + 1);
-        ended.done().with_context(place)?;
+        self.see_through(process, job, &mut keep, step)?;
         Ok(found)
     }
 }
@@ -385,6 +361,7 @@ pub const PROTOCOL: u32 = 7;
 /// Work of one process.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Request {
+    /// Told for a worker of another version; its first line is what is compared.
     pub protocol: u32,
     /// The arguments of the command, from which all else follows.
     pub args: Vec<String>,
@@ -461,4 +438,14 @@ pub enum Message {
     Failed(String),
     /// The share is done.
     Done,
+}
+
+impl Message {
+    /// The part that it brings.
+    pub fn part(self) -> Option<Part> {
+        match self {
+            Message::Part(part, _) => Some(*part),
+            _ => None,
+        }
+    }
 }

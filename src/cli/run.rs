@@ -13,7 +13,7 @@ use indicatif::ProgressBar;
 use super::args::{MergeArgs, RunArgs};
 use super::document::show;
 use super::interrupt::{self, Interrupted};
-use super::processes::{Ended, Job, Message, Workers};
+use super::processes::{Died, Job, Message, Workers};
 use super::report::{close, shown, write_page};
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{TypedOptions, command_line, create, resume, same_recorded};
@@ -185,16 +185,15 @@ impl<'a> Run<'a> {
             if !share.wanted.contains(&true) {
                 return Ok(());
             }
-            match self.worker(scene, share)? {
-                Ended::Done => return Ok(()),
-                Ended::Failed(reason) => bail!("{reason}"),
-                Ended::Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
+            let Err(ended) = self.worker(scene, share) else {
+                return Ok(());
+            };
+            match ended.downcast()? {
+                Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
                     failed.insert(structure, verdict);
                 }
                 // Not any structure's doing, as far as one can tell.
-                Ended::Died(_, verdict) => {
-                    return self.fail_all(&failed, &keys, process, &verdict);
-                }
+                Died(_, verdict) => return self.fail_all(&failed, &keys, process, &verdict),
             }
         }
     }
@@ -215,7 +214,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn worker(&mut self, scene: usize, share: Share) -> Result<Ended> {
+    fn worker(&mut self, scene: usize, share: Share) -> Result<()> {
         let process = share.process;
         let job = Job::scene(scene, share, true);
         let source = self.plan.scenes[scene].source.clone();
@@ -344,8 +343,10 @@ pub fn merge(args: &MergeArgs) -> Result<Ending> {
     let kept = [&["run".to_owned()][..], &options].concat();
     let merged = join(&args.runs, (&kept, &command_line(&kept)))?;
     interrupt::from_now_on_finish();
-    if !merged.write(&args.out, &interrupt::asked)? {
-        return Ok(Ending::Interrupted);
+    let check = || interrupt::check().map_err(io::Error::other);
+    match merged.write(&args.out, &check) {
+        Err(_) if interrupt::asked() => return Ok(Ending::Interrupted),
+        written => written?,
     }
     let report = merged.stream.report();
     write_page(&report, &args.out, Vec::new())?;

@@ -6,6 +6,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use anyhow::Context;
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
@@ -195,8 +196,9 @@ impl Study {
                 Message::Times(times) => Some(times),
                 _ => None,
             };
-            let job = Job::Times(timing);
-            all.extend((self.workers).found(process, job, &|_| self.begin(step), times)?);
+            let (begin, job) = (|_: &str| self.begin(step), Job::Times(timing));
+            let found = self.workers.found(process, job, &begin, times);
+            all.extend(found.with_context(|| format!("process {}", process + 1))?);
             self.bar.inc(1);
             tell_progress(&self.bar, "steps", &mut told);
         }

@@ -41,11 +41,6 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
 }
 
 fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        request.protocol == PROTOCOL,
-        "protocol {} is requested; expected {PROTOCOL}: the two programs are of different versions",
-        request.protocol
-    );
     let at = Arc::new(At::default());
     // Before the processor is chosen: it may wake up on another one.
     at.clone().tell_of_turns();

@@ -109,11 +109,12 @@ impl Merged {
     /// Writes the four files of a run into a folder that is new or empty.
     ///
     /// They are written beside it and renamed, into an empty folder the stream last, so that
-    /// nothing that ends it leaves half a run. False if stopped.
+    /// nothing that ends it leaves half a run.
     ///
     /// # Errors
-    /// A folder that holds a run or other files; errors of the file system.
-    pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, InputError> {
+    /// A folder that holds a run or other files; errors of the file system and of `check`,
+    /// which is asked before every long step.
+    pub fn write(&self, out: &Path, check: &dyn Fn() -> io::Result<()>) -> Result<(), InputError> {
         let io = writing::io(out);
         folder::refuse_taken(out)?;
         let out = match out.exists() {
@@ -127,19 +128,15 @@ impl Merged {
         }
         fs::create_dir_all(parent).map_err(io)?;
         let (beside, lock) = temporary_folder_in(parent).map_err(io)?;
-        let all = self.write_samples(&beside.path().join(SAMPLES), stop);
-        if !all.map_err(io)? {
-            return Ok(false);
-        }
+        let all = self.write_samples(&beside.path().join(SAMPLES), check);
+        all.map_err(io)?;
         let stream = beside.path().join(STREAM);
         let lines = self.stream.lines().map(|line| line.to_json());
         let lines: io::Result<Vec<Vec<u8>>> = lines.collect();
         let written = lines.and_then(|lines| fs::write(stream, lines.concat()));
         written.map_err(io)?;
         save_report(beside.path(), &self.stream.report())?;
-        if stop() {
-            return Ok(false);
-        }
+        check().map_err(io)?;
         if out.exists() {
             // Of a folder that a shell may be in, which stays; the stream makes it a run.
             let listed = fs::read_dir(beside.path()).map_err(io)?;
@@ -154,23 +151,19 @@ impl Merged {
             let _ = beside.keep();
         }
         drop(lock);
-        Ok(true)
+        Ok(())
     }
 
-    /// False if stopped.
-    fn write_samples(&self, path: &Path, stop: &dyn Fn() -> bool) -> io::Result<bool> {
+    fn write_samples(&self, path: &Path, check: &dyn Fn() -> io::Result<()>) -> io::Result<()> {
         let mut out = BufWriter::new(File::create_new(path)?);
         out.write_all(SAMPLE_COLUMNS.as_bytes())?;
         for (file, [from, to]) in &self.samples {
-            if stop() {
-                return Ok(false);
-            }
+            check()?;
             let mut file = File::open(file)?;
             file.seek(SeekFrom::Start(*from))?;
             io::copy(&mut file.take(to - from), &mut out)?;
         }
-        out.flush()?;
-        Ok(true)
+        out.flush()
     }
 }
 
