@@ -34,7 +34,7 @@ pub fn list(registry: &Registry, one: Option<ListTopic>, format: TableFormat) ->
         let columns: Vec<Vec<String>> = rows.iter().map(told).collect();
         let in_line = columns.iter().all(|own| own.join("; ").len() < 60);
         let rows = rows.iter().zip(columns).map(|(row, columns)| {
-            let [name, summary] = ["name", "summary"].map(|key| text_of(&row[key]));
+            let [name, summary] = ["name", "summary"].map(|key| plain(&row[key], ", "));
             let text = match in_line && !columns.is_empty() {
                 true => format!("{summary} ({})", columns.join("; ")),
                 false => [vec![summary], columns].concat().join("\n"),
@@ -58,20 +58,12 @@ pub fn list(registry: &Registry, one: Option<ListTopic>, format: TableFormat) ->
 fn told(row: &Value) -> Vec<String> {
     let told = COLUMNS.split(' ').filter_map(|column| {
         // Parameters as they are typed behind the name.
-        let value = text_of(row.get(column)?).replace("\":", "=");
+        let value = plain(row.get(column)?, ", ").replace("\":", "=");
         Some((column, value.replace(['{', '}', '"'], "")))
     });
     let told = told.filter(|(_, value)| !value.is_empty());
     told.map(|(column, value)| format!("{column} {value}"))
         .collect()
-}
-
-fn text_of(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Array(words) => text::joined(words.iter().filter_map(Value::as_str)),
-        other => other.to_string(),
-    }
 }
 
 /// A row of a name, one further column and a summary.
@@ -186,7 +178,7 @@ pub fn env(format: TableFormat) -> Result<Ending> {
         let mut table = Table::of("fact | value");
         for (group, facts) in facts.as_object().into_iter().flatten() {
             for (name, value) in facts.as_object().into_iter().flatten() {
-                table.add_row([format!("{group}.{name}"), plain(value)]);
+                table.add_row([format!("{group}.{name}"), plain(value, " ")]);
             }
         }
         write!(io::stdout(), "{}", table.fitted(text::width()))
@@ -194,13 +186,17 @@ pub fn env(format: TableFormat) -> Result<Ending> {
     Ok(Ending::Ok)
 }
 
-fn plain(value: &Value) -> String {
+/// A value for people, with `between` the values of a list.
+fn plain(value: &Value, between: &str) -> String {
     match value {
         Value::Null => "unknown".to_owned(),
         Value::String(text) => text.clone(),
-        Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
+        Value::Array(values) => {
+            let values = values.iter().map(|value| plain(value, between));
+            values.collect::<Vec<_>>().join(between)
+        }
         Value::Object(fields) => {
-            let field = |(name, value)| format!("{name}={}", plain(value));
+            let field = |(name, value)| format!("{name}={}", plain(value, between));
             format!("({})", text::joined(fields.iter().map(field)))
         }
         other => other.to_string(),

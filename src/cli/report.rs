@@ -161,14 +161,8 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
         }
     }
     let warnings = report.input_warnings().into_iter();
-    let warnings = warnings.chain(
-        report
-            .noise
-            .warnings
-            .iter()
-            .chain(&report.run.left_out)
-            .map(String::as_str),
-    );
+    let warnings = warnings.chain(&report.noise.warnings);
+    let warnings = warnings.chain(&report.run.left_out);
     blocks.extend(warnings.map(|said| Block::Line(format!("Warning: {said}"))));
     blocks.extend(details(report, &all, views));
     let every: Vec<&Comparison> = all.iter().collect();

@@ -117,7 +117,7 @@ fn same_options(recorded: &[String]) -> Result<RunArgs> {
     let now = TypedOptions::of("run", "run", std::env::args_os())?;
     for (id, name, _) in now.typed() {
         ensure!(
-            NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(id) == now.values(id),
+            NOT_OF_THE_PLAN.contains(&id) || before.values(id) == now.values(id),
             "--{name} is '{}', and the run was begun {}; expected the same or none: \
              --resume continues with the recorded options",
             now.values(id).join(" "),
@@ -143,8 +143,8 @@ const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 /// shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> Result<()> {
     let (one, other) = (TypedOptions::recorded(one)?, TypedOptions::recorded(other)?);
-    for (id, name, _) in &one.all {
-        let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id.as_str());
+    for (id, name, _) in one.all() {
+        let is_free = id == "shard" || NOT_OF_THE_PLAN.contains(&id);
         let (first, this) = (one.told(id), other.told(id));
         ensure!(
             is_free || first == this,
@@ -163,8 +163,7 @@ fn one_line(error: clap::Error) -> anyhow::Error {
 /// The options of a command, as they were typed behind it or another.
 pub struct TypedOptions {
     matches: ArgMatches,
-    /// Ids and names of all options; true for those with a value.
-    all: Vec<(String, String, bool)>,
+    owner: clap::Command,
 }
 
 impl TypedOptions {
@@ -183,20 +182,27 @@ impl TypedOptions {
         let mut cli = Cli::command();
         let matches = cli.try_get_matches_from_mut(line).map_err(one_line)?;
         let matches = matches.subcommand_matches(command).cloned();
-        let owner = cli.find_subcommand(owner).into_iter();
-        let all = owner.flat_map(|owner| owner.get_arguments()).map(|arg| {
-            let id = arg.get_id().as_str();
-            let name = arg.get_long().unwrap_or(id).to_owned();
-            (id.to_owned(), name, arg.get_action().takes_values())
-        });
+        let owner = cli.find_subcommand(owner).cloned();
         Ok(TypedOptions {
             matches: matches.context(NO_RUN)?,
-            all: all.collect(),
+            owner: owner.context(NO_RUN)?,
         })
     }
 
-    fn typed(&self) -> impl Iterator<Item = &(String, String, bool)> {
-        self.all.iter().filter(|(id, ..)| {
+    /// Ids and names of all options; true for those with a value.
+    fn all(&self) -> impl Iterator<Item = (&str, &str, bool)> {
+        self.owner.get_arguments().map(|arg| {
+            let id = arg.get_id().as_str();
+            (
+                id,
+                arg.get_long().unwrap_or(id),
+                arg.get_action().takes_values(),
+            )
+        })
+    }
+
+    fn typed(&self) -> impl Iterator<Item = (&str, &str, bool)> {
+        self.all().filter(|(id, ..)| {
             let is_known = self.matches.try_contains_id(id).unwrap_or(false);
             is_known && self.matches.value_source(id) == Some(ValueSource::CommandLine)
         })

@@ -167,9 +167,8 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
 /// A share where the interval is nearly symmetric in the logarithm, elsewhere its ends;
 /// nothing if one is not known.
 pub fn time_with(metric: &Metric) -> String {
-    let ns = metric
-        .estimate()
-        .times([1.0, 1e6][usize::from(metric.unit == "ms")]);
+    let size = [1.0, 1e6][usize::from(metric.unit == "ms")];
+    let ns = metric.estimate().times(size);
     let (value, ends) = (ns.value, ns.ends());
     let logs = ends.map(|[lower, upper]| [value / lower, upper / value].map(f64::ln));
     let uncertainty = match logs {

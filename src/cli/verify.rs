@@ -97,7 +97,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     bar.finish_and_clear();
     let outcome = Outcome {
         ok: checks.iter().all(|c| c.difference.is_none())
-            && (checks.is_empty() || checks.iter().any(Check::is_answered)),
+            && (checks.is_empty() || checks.iter().any(|c| c.status == Status::Ok)),
         verdicts: checks.iter().map(|c| c.verdicts).sum(),
         skipped_items,
         mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
@@ -137,7 +137,7 @@ fn check_path(
         for (row, more) in rows.iter_mut().zip(checked) {
             row.volumes += more.volumes;
             row.verdicts += more.verdicts;
-            if row.is_answered() {
+            if row.status == Status::Ok {
                 (row.status, row.difference) = (more.status, more.difference);
             }
         }
@@ -205,7 +205,7 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
         return;
     }
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
-        check.status = Status::Unsafe.name();
+        check.status = Status::Unsafe;
         check.difference = Some(format!(
             "camera level: missed {}{or_points} and {}, the deepest by {:e}\n  again: {again}",
             text::counted(errors.false_negatives as usize, "visible item"),
@@ -235,13 +235,6 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
     errors
 }
 
-impl Check {
-    /// False where an answer is wrong or not there.
-    fn is_answered(&self) -> bool {
-        self.status == Status::Ok.name()
-    }
-}
-
 pub fn check(workload: &Workload, subjects: &[Subject], kind: &str, again: &str) -> Vec<Check> {
     let counted = count_pass(workload, subjects, &|_, _| ());
     let scene = workload.scene;
@@ -254,7 +247,7 @@ pub fn check(workload: &Workload, subjects: &[Subject], kind: &str, again: &str)
         Check {
             volumes: workload.views.len(),
             verdicts: if is_asked { questions as u64 } else { 0 },
-            status: status.name(),
+            status,
             difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),
             scene: scene.name.clone(),
             path: workload.path.clone(),
@@ -270,7 +263,6 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         scene: RANDOM.to_owned(),
         path: path.clone(),
         structure: structure.label.clone(),
-        status: Status::Ok.name(),
         ..Check::default()
     };
     let mut checks: Vec<Check> = structures.iter().map(of).collect();
@@ -297,7 +289,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
                 Err(error) => Err(Verdict::new(Status::Wrong, error.to_string())),
             };
             if let Err(Verdict { status, reason }) = found {
-                check.status = status.name();
+                check.status = status;
                 let kind = VOLUME_KINDS[case.kind];
                 let items = text::counted(case.items.len(), "item");
                 let (program, kernel) = (program::name(), spec.execution.kernel.name());
@@ -361,7 +353,7 @@ pub struct Check {
     structure: String,
     volumes: usize,
     verdicts: u64,
-    status: &'static str,
+    status: Status,
     /// The first difference and the command that shows it again.
     pub difference: Option<String>,
 }
@@ -400,7 +392,7 @@ fn show(outcome: &Outcome) -> io::Result<()> {
             text::count(verdicts as usize)
         }),
         ("status", |own| {
-            let mut statuses: Vec<&str> = own.iter().map(|check| check.status).collect();
+            let mut statuses: Vec<&str> = own.iter().map(|check| check.status.name()).collect();
             statuses.sort_unstable();
             statuses.dedup();
             statuses.join(", ")
@@ -417,7 +409,7 @@ fn show(outcome: &Outcome) -> io::Result<()> {
     }
     let own = all.iter().map(|(_, own)| own);
     let differ = own.filter(|own| own.iter().any(|check| check.difference.is_some()));
-    let is_silent = |check: &&Check| check.difference.is_none() && !check.is_answered();
+    let is_silent = |check: &&Check| check.difference.is_none() && check.status != Status::Ok;
     let silent = all.iter().filter(|(_, own)| own.iter().any(is_silent));
     let (of, checks) = (text::counted(all.len(), "structure"), outcome.checks.len());
     let reference = "the reference scan";

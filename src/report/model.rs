@@ -37,10 +37,9 @@ pub struct Report {
 
 impl Report {
     /// Doubts about cameras, each once.
-    pub fn input_warnings(&self) -> BTreeSet<&str> {
+    pub fn input_warnings(&self) -> BTreeSet<&String> {
         let cells = self.cells.iter();
-        let all = cells.flat_map(|cell| &cell.path.warnings);
-        all.map(String::as_str).collect()
+        cells.flat_map(|cell| &cell.path.warnings).collect()
     }
 
     /// Returns true if an answer is wrong, or if structures were tried and none has

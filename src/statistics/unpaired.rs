@@ -72,15 +72,13 @@ fn add_scatter_of_runs<S: Ord, G: Ord>(cells: &mut [Trimmed], names: &[&(S, G)])
         median(&cells.iter().map(|cell| cell.mean).collect::<Vec<_>>()).unwrap_or_default()
     });
     let of_group = scatter_within(cells, names.iter().map(|names| &names.1), |_| 0.0);
-    let added = cells
-        .iter_mut()
-        .zip(names)
-        .map(|(cell, (structure, group))| {
-            let own = of_structure[structure].max(of_group[group]);
-            let scatter = of_all.max(own).sqrt();
-            cell.standard_error = cell.standard_error.hypot(scatter);
-            scatter
-        });
+    let cells = cells.iter_mut().zip(names);
+    let added = cells.map(|(cell, (structure, group))| {
+        let own = of_structure[structure].max(of_group[group]);
+        let scatter = of_all.max(own).sqrt();
+        cell.standard_error = cell.standard_error.hypot(scatter);
+        scatter
+    });
     added.collect()
 }
 
@@ -95,10 +93,8 @@ fn scatter_within<'n, N: Ord>(
         alike.entry(name).or_default().push(*cell);
     }
     let scatter = |cells: Vec<Trimmed>| excess_variance(&cells, middle(&cells), LEAST_OF_ONE);
-    alike
-        .into_iter()
-        .map(|(name, cells)| (name, scatter(cells)))
-        .collect()
+    let alike = alike.into_iter();
+    alike.map(|(name, cells)| (name, scatter(cells))).collect()
 }
 
 /// Variance of the means about `middle` beyond their standard errors, by the median

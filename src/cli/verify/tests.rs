@@ -69,7 +69,10 @@ fn a_panic_in_a_random_case_is_its_status_and_says_how_to_see_it_again() {
     };
     let linear = StructureSpec::parse("linear").expect("linear");
     let checks = random_cases(&[spec, linear], 5, 3);
-    assert_eq!([checks[0].status, checks[1].status], ["panicked", "ok"]);
+    assert_eq!(
+        [checks[0].status, checks[1].status],
+        [Status::Panicked, Status::Ok]
+    );
     let told = checks[0].difference.as_deref().unwrap_or_default();
     assert!(
         told.contains("deep in a peer's code") && told.contains("--seed 5 --structure 'panics'"),
@@ -101,7 +104,7 @@ fn a_structure_that_refused_to_build_is_not_called_right() {
         [&linear, &refused].map(build).into_iter().collect()
     });
     let rows = check_path(&scene, &cameras, &Culling::default(), &subjects, "again").expect("rows");
-    assert!(rows[0].is_answered() && rows[0].verdicts > 0);
-    assert!(!rows[1].is_answered() && rows[1].verdicts == 0);
-    assert!(rows[1].difference.is_none() && rows[1].status == "refused");
+    assert!(rows[0].status == Status::Ok && rows[0].verdicts > 0);
+    assert!(rows[1].status == Status::Refused && rows[1].verdicts == 0);
+    assert!(rows[1].difference.is_none());
 }
