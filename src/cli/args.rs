@@ -81,9 +81,6 @@ pub enum Command {
         #[arg(long, value_enum, default_value = "table")]
         format: TableFormat,
     },
-    /// Measure one share of a run (started by `run` and `compare` themselves)
-    #[command(hide = true)]
-    Worker,
     /// Print shell completions
     Completions { shell: clap_complete::Shell },
     /// Print the manual (roff), or write it as a page per command

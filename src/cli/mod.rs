@@ -135,27 +135,31 @@ pub fn main_as(program: (&'static str, &'static str), registry: Registry) -> Exi
     start(Some(program), registry)
 }
 
+/// The only argument of a process that measures a share of a run.
+const WORKER: &str = "worker";
+
 /// Place of an error that no file has.
 const OUTPUT: &str = "standard output: ";
 
 fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
     program::set(program);
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => return refused(&error),
-    };
-    match cli.command {
+    let ended = if std::env::args_os().skip(1).eq([WORKER]) {
         // A terminal sends Ctrl-C to the whole group, and it is the parent that decides what
         // becomes of its workers. Without this one ends early: its parent is about to end it.
-        Command::Worker => drop(ctrlc::set_handler(|| ())),
-        _ => {
-            interrupt::install();
-            hold_files(BTreeMap::new());
-            tell_notes(tell);
-        }
-    }
-    let checked = cli.command.expect_one_stdin();
-    match checked.and_then(|()| dispatch(&registry, cli.command)) {
+        drop(ctrlc::set_handler(|| ()));
+        worker::worker(&registry)
+    } else {
+        let cli = match Cli::try_parse() {
+            Ok(cli) => cli,
+            Err(error) => return refused(&error),
+        };
+        interrupt::install();
+        hold_files(BTreeMap::new());
+        tell_notes(tell);
+        let checked = cli.command.expect_one_stdin();
+        checked.and_then(|()| dispatch(&registry, cli.command))
+    };
+    match ended {
         Ok(ending) => {
             tell_warnings();
             ExitCode::from(ending as u8)
@@ -217,14 +221,9 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
         Command::Scene(SceneCommand::Draw(args)) => scene::draw(registry, &args),
         Command::View(args) => view::view(registry, &args),
         Command::Env { format } => list::env(format),
-        Command::Worker => worker::worker(registry),
         Command::Completions { shell } => {
-            let (mut script, all) = (Vec::new(), Cli::command());
-            // The script generators offer hidden commands too.
-            let shown = all.get_subcommands().filter(|c| !c.is_hide_set());
-            let program = clap::Command::new(program::name()).version(program::version());
-            let mut shown = program.subcommands(shown.cloned());
-            clap_complete::generate(shell, &mut shown, program::name(), &mut script);
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), program::name(), &mut script);
             print_all(&script)
         }
         Command::Man { folder: None } => {
@@ -248,8 +247,8 @@ fn dispatch(registry: &Registry, command: Command) -> Result<Ending> {
 /// Writes the pages of a command and of those below it, one after the other.
 fn manual(command: &clap::Command, pages: &mut Vec<u8>) -> io::Result<()> {
     clap_mangen::Man::new(command.clone()).render(pages)?;
-    let mut shown = command.get_subcommands().filter(|c| !c.is_hide_set());
-    shown.try_for_each(|below| manual(below, pages))
+    let mut below = command.get_subcommands();
+    below.try_for_each(|below| manual(below, pages))
 }
 
 /// Prints a text as one line on stderr, which a terminal gets wrapped.

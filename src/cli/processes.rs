@@ -230,7 +230,7 @@ impl Workers {
             command.process_group(0).arg0(super::program::name());
         }
         let mut child = command
-            .arg("worker")
+            .arg(super::WORKER)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -1,5 +1,5 @@
-//! The child's side of what is measured over processes: `cullbench worker`, hidden
-//! in the help. It reads one request, does one process's share of a job, and writes
+//! The child's side of what is measured over processes: `cullbench worker`, which is
+//! no command for people. It reads one request, does one process's share of a job, and writes
 //! steps and results to standard output, a JSON line each.
 
 use std::io::{self, BufRead, Write};
