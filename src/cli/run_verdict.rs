@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::{Block, Table};
 use super::text;
-use crate::measure::{Machine, SharedWork, Status, YARDSTICK};
+use crate::measure::{Machine, Status, YARDSTICK};
 use crate::report::{Comparison, Mean, Overall, ReportCell, grouped, times_as_fast};
 
 /// "a", "a and b", "a, b and c".
@@ -112,21 +112,32 @@ pub fn sharing<'c>(
     threads: usize,
     machine: &Machine,
 ) -> Option<[Block; 3]> {
-    let shared = SharedWork::of(cells);
-    shared.first()?;
+    let cells: Vec<&ReportCell> = cells.into_iter().collect();
     let mut table =
         Table::of("structure | threads share | > wall per query | > speed-up | > CPU time");
-    let what = |work: &SharedWork| ["each query", "the views"][usize::from(work.shares_views)];
-    for work in &shared {
-        let (name, cpu) = (work.structure.clone(), text::some(work.cpu_ratio, times));
-        let (wall, gain) = (text::time(work.wall_ns), times(work.wall_gain));
-        table.add_row([name, what(work).to_owned(), wall, gain, cpu]);
+    let mut gains = Vec::new();
+    for cell in &cells {
+        let own = on_one_thread(&cell.structure);
+        let is_alone = |cell: &&&ReportCell| Some(&cell.structure) == own.as_ref();
+        let queries = ["query_wall_ns", "query_ns"];
+        let (what, alone, [wall, cpu]) = match &own {
+            Some(_) => ("each query", cells.iter().find(is_alone), queries),
+            None => ("the views", Some(cell), ["views_wall_ns", "views_ns"]),
+        };
+        let [one_wall, one_cpu] = queries.map(|metric| alone.and_then(|cell| cell.value(metric)));
+        let Some((wall, one_wall)) = cell.value(wall).zip(one_wall) else {
+            continue;
+        };
+        let cpu = text::some(cell.value(cpu).zip(one_cpu), |(all, one)| times(all / one));
+        let (name, gain) = (cell.structure.as_str(), one_wall / wall);
+        table.add_row([name, what, &text::time(wall), &times(gain), &cpu]);
+        gains.push((what, (gain, name)));
     }
-    let groups = grouped(shared.iter().map(|work| (what(work), work)));
-    let gains = groups.into_iter().map(|(what, own)| {
-        let own = own.into_iter().filter(|work| work.wall_gain > LEAST_GAIN);
-        let gain = match own.max_by(|a, b| a.wall_gain.total_cmp(&b.wall_gain)) {
-            Some(best) => format!("at most {} ({})", times(best.wall_gain), best.structure),
+    gains.first()?;
+    let gains = grouped(gains.into_iter()).into_iter().map(|(what, own)| {
+        let own = own.into_iter().filter(|(gain, _)| *gain > LEAST_GAIN);
+        let gain = match own.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((gain, name)) => format!("at most {} ({name})", times(gain)),
             None => "no gain".to_owned(),
         };
         format!("{gain} from sharing {what}")
@@ -137,6 +148,13 @@ pub fn sharing<'c>(
         text::joined(gains)
     );
     Some([Block::Table(table), Block::line(""), Block::Line(told)])
+}
+
+/// Label without its threads: `linear@rebuild` of `linear:threads=2@rebuild`.
+fn on_one_thread(label: &str) -> Option<String> {
+    let (before, after) = label.rsplit_once("threads=")?;
+    let after = after.trim_start_matches(|c: char| c.is_ascii_digit());
+    Some(before.strip_suffix([':', ','])?.to_owned() + after)
 }
 
 /// Wall times nearer than this are the layout of memory.
@@ -316,4 +334,22 @@ fn standing(all: &[&Comparison], overall: &Overall) -> String {
         told += &format!(" Without a mean, as without times somewhere: {apart}.");
     }
     told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_partner_has_the_policy_and_no_threads() {
+        for (label, wanted) in [
+            ("linear:threads=2", Some("linear")),
+            ("linear:leaf=4,threads=16", Some("linear:leaf=4")),
+            ("linear:threads=2@rebuild", Some("linear@rebuild")),
+            ("threads=2", None),
+            ("\u{e9}threads=2", None),
+        ] {
+            assert_eq!(on_one_thread(label).as_deref(), wanted, "{label}");
+        }
+    }
 }
