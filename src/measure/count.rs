@@ -174,12 +174,12 @@ pub struct Judged {
 /// Checks as many cameras as `most` verdicts of the oracle allow, from 1 to 16.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;
-    let mut sums = Judging::default();
-    for n in spread(scene.items.len(), most, workload.cameras.len()) {
-        let truth = Truth::of_scene(&workload.cameras[n], scene);
-        sums.add(workload, n, truth, &scene.items, &workload.items);
-    }
-    sums.judged()
+    let judged = spread(scene.items.len(), most, workload.cameras.len());
+    let found = judged.filter_map(|n| {
+        let truth = Truth::of_scene(&workload.cameras[n], scene)?;
+        Some(errors(workload, n, &truth, &scene.items, &workload.items))
+    });
+    Judged::of(found.collect())
 }
 
 /// Queries that are judged, evenly spread.
@@ -189,38 +189,30 @@ pub fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item =
     evenly(queries, (most / items.max(1)).clamp(1, 16))
 }
 
-/// Errors of the queries that are judged.
-#[derive(Default)]
-pub(super) struct Judging(Vec<ErrorCount>);
-
-impl Judging {
-    /// Compares the answer about items, `held` as the test has them, with the truth.
-    pub(super) fn add(
-        &mut self,
-        workload: &Workload,
-        camera: usize,
-        truth: Option<Truth>,
-        items: &[Aabb],
-        held: &[Aabb],
-    ) {
-        let Some(truth) = truth else { return };
-        let view = workload.views[camera].as_any();
-        let answer: Vec<ItemId> = scan(held, |b| view.sees(b)).collect();
-        let errors = truth.errors(items, &answer);
-        self.0.push(blamed(workload.culling.test, errors));
-    }
-
-    pub(super) fn judged(self) -> Judged {
-        let excess = rate_of(&self.0, |e| [e.false_positives, e.visible]);
-        Judged {
-            judged_queries: self.0.len(),
-            errors: self.0.into_iter().sum(),
-            excess_interval: excess.and_then(Estimate::ends),
-        }
-    }
+/// Errors of the answer about items, `held` as the test has them.
+pub(super) fn errors(
+    workload: &Workload,
+    camera: usize,
+    truth: &Truth,
+    items: &[Aabb],
+    held: &[Aabb],
+) -> ErrorCount {
+    let view = workload.views[camera].as_any();
+    let answer: Vec<ItemId> = scan(held, |b| view.sees(b)).collect();
+    blamed(workload.culling.test, truth.errors(items, &answer))
 }
 
 impl Judged {
+    /// The errors of the queries that are judged.
+    pub(super) fn of(found: Vec<ErrorCount>) -> Judged {
+        let excess = rate_of(&found, |e| [e.false_positives, e.visible]);
+        Judged {
+            judged_queries: found.len(),
+            errors: found.into_iter().sum(),
+            excess_interval: excess.and_then(Estimate::ends),
+        }
+    }
+
     /// The verdict of every structure, if visible items are missed.
     pub(super) fn unsafe_verdict(&self) -> Option<Verdict> {
         let errors = &self.errors;

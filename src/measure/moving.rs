@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
-use super::count::{Judging, MOST_JUDGED, spread};
+use super::count::{MOST_JUDGED, errors, spread};
 use super::process_result::Known;
 use super::{
     Answer, Judged, Notice, Protocol, Schedule, Status, TaskKind, TimedTask, Verdict, Workload,
@@ -54,7 +54,7 @@ impl<'w> Frames<'w> {
             return frames;
         }
         let (mut items, mut replay) = (workload.items.to_vec(), motion.replay());
-        let (scene, mut judging) = (workload.scene, Judging::default());
+        let (scene, mut judging) = (workload.scene, Vec::new());
         let (mut boxes, mut shown) = (scene.items.to_vec(), motion.replay());
         let mut written = scene.originals.or_stored(boxes.len());
         let due = spread(items.len(), MOST_JUDGED, motion.frames);
@@ -71,14 +71,15 @@ impl<'w> Frames<'w> {
                 let written = Originals::listed(&written);
                 let seen = &workload.cameras[camera];
                 let truth = Truth::of_written(seen, scene.origin, &boxes, &written);
-                judging.add(workload, camera, truth, &boxes, &items);
+                let errors = truth.map(|truth| errors(workload, camera, &truth, &boxes, &items));
+                judging.extend(errors);
             }
             for (_, view) in frames.views(frame) {
                 let ids: Vec<ItemId> = scan(&items, |b| view.as_any().sees(b)).collect();
                 frames.right.push(Answer::of(&ids));
             }
         }
-        frames.judged = Some(judging.judged());
+        frames.judged = Some(Judged::of(judging));
         frames
     }
 
