@@ -1,6 +1,7 @@
-//! The child's side of what is measured over processes: `cullbench worker`, which is
-//! no command for people. It reads one request, does one process's share of a job, and writes
-//! steps and results to standard output, a JSON line each.
+//! The child's side of what is measured over processes: `cullbench worker`.
+//!
+//! No command for people. It reads one request, does one process's share of a job, and
+//! writes steps and results to standard output, a JSON line each.
 
 use std::io::{self, BufRead, Write};
 use std::sync::atomic::{AtomicU64, Ordering};

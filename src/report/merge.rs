@@ -113,7 +113,7 @@ impl Merged {
     ///
     /// # Errors
     /// A folder that holds a run or other files; errors of the file system and of `check`,
-    /// which is asked before every long step.
+    /// which comes before every long step.
     pub fn write(&self, out: &Path, check: &dyn Fn() -> io::Result<()>) -> Result<(), InputError> {
         let io = writing::io(out);
         folder::refuse_taken(out)?;
