@@ -12,10 +12,10 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Machine, Protocol, Schedule, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed,
+    Machine, Protocol, Schedule, Stopwatch, Timed, TimedTask, Workload, cameras_within, median,
+    slope, timed,
 };
 use cullbench::query::AnyVolume;
-use cullbench::statistics::{median, slope};
 use cullbench::{path, scene};
 
 /// Each with the largest number of items that it is built over.

@@ -38,9 +38,7 @@
 //!
 //! Modules, each of which may use those before it:
 //!
-//! - [`shown`], [`spec`], [`input`], [`json`]: texts and files of users, shown and read
-//! - [`kernel`]: instruction sets, chosen at run time; [`threads`]: thread pools
-//! - [`arithmetic`]: directed rounding, exact sums and products
+//! - [`kernel`]: instruction sets, chosen at run time
 //! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
 //! - [`query`]: query volumes ([`query::QueryVolume`]), sinks ([`query::Sink`]) and
 //!   counters ([`query::Recorder`])
@@ -52,21 +50,23 @@
 //! - [`scene`]: generated and real worlds, and the regions in them; [`path`]: camera paths;
 //!   [`motion`]: items that move between frames
 //! - [`verify`]: the reference answer, and how others differ from it
-//! - [`statistics`] turns times into figures; [`measure`]: count, verify, time
+//! - [`measure`]: count, verify, time
 //! - [`report`]: the files that other tools read
 //!
 //! Features: `cli` (default) is the `cullbench` program (`cli::main_with`), with
-//! `visibility` (the stages before and after the object stage), `stress` and `suite` (named
-//! sets of scenes and paths); its commands `funnel`, `advise`, `precision` and `drift` have
-//! no library interface. `peers` adds structures of other crates.
+//! `visibility` (the stages before and after the object stage) and `stress`; its commands
+//! `funnel`, `advise`, `precision` and `drift` have no library interface. `peers` adds
+//! structures of other crates.
 //!
-//! Conventions: cameras are right-handed; z is up in a scene unless its file or its
-//! options say y; bounds are closed, so touching counts as visible; plane normals point inward; angles
-//! are degrees; items are numbered by their place in the scene.
+//! Conventions: cameras are right-handed; z is up in a scene unless its file or its options
+//! say y; bounds are closed, so touching counts as visible; plane normals point inward;
+//! angles are degrees; items are numbered by their index in the scene.
 
 // docs.rs says of each item which feature it needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(missing_docs)]
+// The program uses more of the modules than a library build has: dead code shows with `cli`.
+#![cfg_attr(not(feature = "cli"), allow(unused))]
 // Denied, not forbidden, where there are vectors: one folder may, and says so
 // itself. With plain arrays there is none.
 #![deny(unsafe_code)]
@@ -80,7 +80,7 @@ mod named;
 
 #[cfg(feature = "cli")]
 mod advise;
-pub mod arithmetic;
+mod arithmetic;
 pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -91,8 +91,8 @@ mod drift;
 mod funnel;
 pub mod geometry;
 pub mod index;
-pub mod input;
-pub mod json;
+mod input;
+mod json;
 pub mod kernel;
 pub mod measure;
 pub mod motion;
@@ -103,14 +103,14 @@ mod precision;
 pub mod query;
 pub mod report;
 pub mod scene;
-pub mod shown;
-pub mod spec;
-pub mod statistics;
+mod shown;
+mod spec;
+mod statistics;
 #[cfg(feature = "cli")]
 pub mod stress;
 #[cfg(feature = "cli")]
-pub mod suite;
-pub mod threads;
+mod suite;
+mod threads;
 pub mod verify;
 #[cfg(feature = "cli")]
 pub mod visibility;
@@ -120,16 +120,14 @@ pub mod visibility;
 /// A structure of one's own takes more, of [`index`] and [`query`]: see
 /// `examples/enter_your_crate.rs`.
 pub mod prelude {
-    pub use crate::camera::{Camera, Lens, PlaneOptions, Surroundings, look_at};
-    pub use crate::culling::{Culling, CullingTest};
+    pub use crate::camera::{Camera, Lens, PlaneOptions, look_at};
     pub use crate::geometry::{Aabb, ConvexVolume, Plane};
     pub use crate::index::{
-        Bsp, BuildError, Bvh, FrustumQuery, Input, Linear, Moving, Octree, Quadtree, RegionIndex,
-        Registry, StructureSpec, UniformGrid, Wide,
+        Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Registry, Wide,
     };
     pub use crate::measure::Status;
     pub use crate::path::{self, CameraPath};
-    pub use crate::query::{ItemId, QueryCost, QueryVolume};
+    pub use crate::query::ItemId;
     pub use crate::report::{Experiment, Report};
     pub use crate::scene::{self, Scene};
 }

@@ -8,11 +8,6 @@ use std::io;
 /// Text on one line: line breaks and tabs are spaces, and what would steer the
 /// reader's terminal, turn the direction of the text or be no XML stands there
 /// as its number, `\u{1b}`.
-///
-/// ```
-/// use cullbench::shown::plain;
-/// assert_eq!(plain("a\tb\u{1b}[31m"), "a b\\u{1b}[31m");
-/// ```
 pub fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -40,12 +35,6 @@ pub fn shortened(text: &str, most: usize) -> String {
 
 /// [`plain`] text of a message. Very long words lose their middle, and so does
 /// the whole: a name of any length leaves place and expectation.
-///
-/// ```
-/// use cullbench::shown::message;
-/// let line = message(&format!("unknown scene '{}'; expected a file", "a".repeat(100_000)));
-/// assert!(line.len() < 300 && line.ends_with("aaa'; expected a file"));
-/// ```
 pub fn message(text: &str) -> String {
     let text = plain(text);
     let words = text.split(' ').map(|word| without_middle(word, [160, 80]));
@@ -173,12 +162,6 @@ pub fn number(value: f64) -> String {
 }
 
 /// "1 cell", "1,234 cells", "no queries".
-///
-/// ```
-/// use cullbench::shown::counted;
-/// let told = [0, 1, 2000].map(|n| counted(n, "query"));
-/// assert_eq!(told, ["no queries", "1 query", "2,000 queries"]);
-/// ```
 pub fn counted(value: usize, one: &str) -> String {
     match value {
         0 => format!("no {}", plural(one)),
@@ -188,12 +171,6 @@ pub fn counted(value: usize, one: &str) -> String {
 }
 
 /// The first names of a list and the number of the others: "a, b and 3 more".
-///
-/// ```
-/// use cullbench::shown::first_of;
-/// let told = [0, 2, 5].map(|n| first_of(&["a", "b", "c", "d", "e"][..n], 2));
-/// assert_eq!(told, ["none", "a, b", "a, b and 3 more"]);
-/// ```
 pub fn first_of(names: &[impl AsRef<str>], most: usize) -> String {
     let named: Vec<&str> = names.iter().take(most).map(AsRef::as_ref).collect();
     match names.len() - named.len() {
@@ -227,6 +204,7 @@ mod tests {
             ),
             ("\u{1b}]0;title\u{7}", "\\u{1b}]0;title\\u{7}"),
             ("\u{9b}31m", "\\u{9b}31m"),
+            ("a\tb\u{1b}[31m", "a b\\u{1b}[31m"),
             ("a\r\nb\u{2028}c", "a  b c"),
             ("exe\u{202e}vsc.\u{2069}", "exe\\u{202e}vsc.\\u{2069}"),
             (
@@ -240,6 +218,15 @@ mod tests {
             assert_eq!(plain(&plain(text)), wanted);
         }
         assert_eq!(lines("a\n\u{1b}b\r\n"), "a\n\\u{1b}b \n");
+    }
+
+    #[test]
+    fn a_long_name_leaves_its_message() {
+        let line = message(&format!(
+            "unknown scene '{}'; expected a file",
+            "a".repeat(100_000)
+        ));
+        assert!(line.len() < 300 && line.ends_with("aaa'; expected a file"));
     }
 
     #[test]
@@ -293,5 +280,8 @@ mod tests {
             [count(7), count(1234), count(1_234_567)],
             ["7", "1,234", "1,234,567"]
         );
+        assert_eq!(counted(2000, "query"), "2,000 queries");
+        let named = [0, 2, 5].map(|n| first_of(&["a", "b", "c", "d", "e"][..n], 2));
+        assert_eq!(named, ["none", "a, b", "a, b and 3 more"]);
     }
 }

@@ -10,20 +10,9 @@ use std::ops::RangeInclusive;
 
 use crate::shown::plain;
 
-#[cfg(feature = "cli")]
 pub(crate) mod values;
 
 /// A name with its parameters, as typed.
-///
-/// ```
-/// use cullbench::spec::Spec;
-/// let mut spec = Spec::parse("city:n=100k,seed=7")?;
-/// assert_eq!(spec.name(), "city");
-/// assert_eq!(spec.number("n", 10.0)?, 100_000.0);
-/// assert_eq!(spec.number("seed", 1.0)?, 7.0);
-/// spec.finish()?;
-/// # Ok::<(), cullbench::spec::SpecError>(())
-/// ```
 #[derive(Clone, Debug)]
 pub struct Spec {
     name: String,

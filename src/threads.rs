@@ -19,13 +19,13 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// A pool of at least 1, at most [`MOST_THREADS`] threads.
+    /// A pool of at least 1, at most 256 threads.
     pub fn new(threads: usize) -> Pool {
         let (threads, asked) = (threads.clamp(1, MOST_THREADS), AtomicBool::new(false));
         Pool { threads, asked }
     }
 
-    /// Number of threads that [`share`] uses.
+    /// Number of threads that the build may use.
     pub fn threads(&self) -> usize {
         self.asked.store(true, Ordering::Relaxed);
         self.threads
@@ -102,7 +102,7 @@ pub struct Workers {
 }
 
 impl Workers {
-    /// At least 1, at most [`MOST_THREADS`] threads.
+    /// At least 1, at most 256 threads.
     ///
     /// # Errors
     /// The system gives no more threads.

@@ -18,11 +18,10 @@ use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::Registry;
 use cullbench::measure::{
     Group, GroupPlan, Machine, Protocol, ReportCell, SceneInfo, Schedule, Status, Stopwatch,
-    Subject, TimedTask, Workload, measure, timed,
+    Subject, TimedTask, Workload, measure, timed, trimmed_mean,
 };
 use cullbench::path::{self, CameraPath};
 use cullbench::scene::{self, Scene};
-use cullbench::statistics::trimmed_mean;
 
 /// `structure` must be at least `floor` times as fast as the textbook loop.
 struct Floor {

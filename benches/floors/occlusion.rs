@@ -5,9 +5,8 @@ use std::hint::black_box;
 
 use cullbench::culling::Culling;
 use cullbench::kernel::{Isa, Kernel, LaneMask, Work};
-use cullbench::measure::{Stopwatch, Workload};
+use cullbench::measure::{Stopwatch, Workload, trimmed_mean};
 use cullbench::query::AnyVolume;
-use cullbench::statistics::trimmed_mean;
 use cullbench::visibility::occlusion::{
     Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, Rects, View,
 };

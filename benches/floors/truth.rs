@@ -4,8 +4,7 @@
 
 use std::hint::black_box;
 
-use cullbench::measure::Stopwatch;
-use cullbench::statistics::trimmed_mean;
+use cullbench::measure::{Stopwatch, trimmed_mean};
 use cullbench::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
 use cullbench::visibility::{Rays, SampleGrid, Solids, surfaces_of};
 

@@ -17,11 +17,10 @@ use cullbench::index::{
 };
 use cullbench::measure::{
     BOUNDS, Group, GroupPlan, Machine, Metric, Protocol, ReportCell, SceneInfo, Status, Stopwatch,
-    Subject, Workload, cameras_within, measure,
+    Subject, Workload, cameras_within, measure, median,
 };
 use cullbench::query::AnyVolume;
 use cullbench::scene::Scene;
-use cullbench::statistics::median;
 use cullbench::{path, scene};
 use table::{
     ALL, LEAST_OF_TREES, MOST_BUILD_NS, MOST_BYTES, MOST_RANGES_US, TINY, TREES, WORLDS, Way, World,

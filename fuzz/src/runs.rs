@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use cullbench::json::from_json;
 use cullbench::report::{
     Basis, JUDGED_METRICS, Report, StoppedRun, Stream, changes, comparisons, growths, merge,
     read_report, read_stream, save_report, settings, surfaces,
@@ -28,7 +27,7 @@ pub fn report(bytes: &[u8]) {
     let folder = folder(&[("report.json", bytes)]);
     if let Some(report) = read(read_report(folder.path())) {
         let text = serde_json::to_vec(&report).expect("a report is JSON");
-        let again: Report = from_json(&text).expect("what was written");
+        let again: Report = serde_json::from_slice(&text).expect("what was written");
         assert_eq!(again, report);
         conclude(folder.path(), &report);
     }

@@ -335,7 +335,7 @@ mod tests {
     use super::*;
     use crate::index::{Registry, UpdatePolicy};
     use crate::measure::ProcessTimes;
-    use crate::statistics::rate;
+    use crate::statistics::rate_of;
 
     /// The tests near the least, over processes that are each a little off.
     ///
@@ -354,7 +354,7 @@ mod tests {
             test,
             query_ns: Some(Estimate::exact(query)),
             excess: None,
-            false_negative_ppm: rate(&[[missed, 1e6]]),
+            false_negative_ppm: rate_of(&[missed], |&missed| [missed as u64, 1_000_000]),
             false_positives_per_query: Some(drawn),
             total_ns: Some(query + drawn),
             task,

@@ -1,13 +1,6 @@
 //! Choices of a few of many: the pairs, triples and quadruples of planes.
 
 /// All ascending choices of `N` numbers below `count`, in lexicographic order.
-///
-/// ```
-/// use cullbench::arithmetic::combinations;
-/// let pairs: Vec<[usize; 2]> = combinations(3).collect();
-/// assert_eq!(pairs, [[0, 1], [0, 2], [1, 2]]);
-/// assert_eq!(combinations::<4>(3).count(), 0);
-/// ```
 pub fn combinations<const N: usize>(count: usize) -> impl Iterator<Item = [usize; N]> {
     let first = (N <= count).then(|| std::array::from_fn(|i| i));
     std::iter::successors(first, move |last: &[usize; N]| {
@@ -19,4 +12,16 @@ pub fn combinations<const N: usize>(count: usize) -> impl Iterator<Item = [usize
         }
         Some(next)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choices_ascend_in_lexicographic_order() {
+        let pairs: Vec<[usize; 2]> = combinations(3).collect();
+        assert_eq!(pairs, [[0, 1], [0, 2], [1, 2]]);
+        assert_eq!(combinations::<4>(3).count(), 0);
+    }
 }

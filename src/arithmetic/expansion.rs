@@ -40,13 +40,6 @@ pub fn two_product(a: f64, b: f64) -> (f64, f64) {
 /// Sums and products are exact as long as no term overflows or underflows
 /// (products of up to five f32 values never do). [`Expansion::leading`] cuts a
 /// number to a few terms: floating-point arithmetic of about 50 bits a term.
-///
-/// ```
-/// use cullbench::arithmetic::Expansion;
-/// let tiny = Expansion::from(1e-30);
-/// let sum = &(&Expansion::from(1.0) + &tiny) - &Expansion::from(1.0);
-/// assert_eq!(sum.estimate(), 1e-30);
-/// ```
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct Expansion {
     terms: Vec<f64>,

@@ -84,9 +84,10 @@ impl Frame {
         self.rotated();
     }
 
-    /// Swings the whole camera about `centre`: `around` degrees about `axis`
-    /// (through the centre), then `over` degrees about its own u. Distance
-    /// and bearing to the centre stay.
+    /// Swings the whole camera about `centre`.
+    ///
+    /// First by `around` degrees about `axis` (through the centre), then by `over` degrees
+    /// about its own u. Distance and bearing to the centre stay.
     ///
     /// # Errors
     /// An axis of length zero, or a value that is not finite; the frame is unchanged.

@@ -105,8 +105,10 @@ pub(super) fn check_finite(name: &str, v: DVec3) -> Result<()> {
     Ok(())
 }
 
-/// Eye position and the unit vectors u (right), v (up) and n (backward: the
-/// camera looks along -n). Right-handed: `u x v = n`.
+/// Position and orientation of a camera.
+///
+/// Eye position and the unit vectors u (right), v (up) and n (backward: the camera looks
+/// along -n). Right-handed: `u x v = n`.
 ///
 /// From "3D Viewing and Camera Control" (E. Agu, CS 543), with the lecture's
 /// names. Turned or moved by a number that is not finite, the frame has no view:
@@ -124,7 +126,8 @@ pub struct Frame {
     pub(super) written: Option<Pose>,
 }
 
-/// The frame that looks from `eye` to `look` with `up` upward:
+/// The frame that looks from `eye` to `look` with `up` upward.
+///
 /// `n = (eye - look)/|eye - look|`, `u = (up x n)/|up x n|`, `v = n x u`.
 ///
 /// The difference and the cross product are exact: the axes are true to some
@@ -140,8 +143,9 @@ pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame> {
 }
 
 impl Pose {
-    /// The numbers that the camera's frame was made of, as long as it has not
-    /// been turned or moved; afterwards the frame's own eye, direction and up.
+    /// The numbers that the camera's frame was made of.
+    ///
+    /// After a turn or a move: the frame's own eye, direction and up.
     pub fn of(camera: &Camera) -> Pose {
         let frame = &camera.frame;
         match frame.written {
@@ -210,9 +214,10 @@ impl Frame {
         Frame { eye, ..*self }
     }
 
-    /// One Newton step towards the nearest orthonormal frame (polar factor;
-    /// Higham 1986, "Computing the polar decomposition", eq. 3.1 in its
-    /// inverse-free form): X(3I - X^T X)/2.
+    /// One Newton step towards the nearest orthonormal frame.
+    ///
+    /// X(3I - X^T X)/2 towards the polar factor (Higham 1986, "Computing the polar
+    /// decomposition", eq. 3.1 in its inverse-free form).
     pub fn orthonormalise(&mut self) {
         let x = DMat3::from_cols(self.u, self.v, self.n);
         let x = x * (DMat3::from_diagonal(DVec3::splat(3.0)) - x.transpose() * x) * 0.5;

@@ -154,9 +154,10 @@ impl Lens {
         Lens::new(self.kind, self.near, far)
     }
 
-    /// Left, right, bottom and top: slopes (offset per unit of depth) for a
-    /// lens with a centre, plain offsets for an orthographic one. A matrix need
-    /// not have any: its planes and corners are its own.
+    /// Left, right, bottom and top of the window.
+    ///
+    /// Slopes (offset per unit of depth) for a lens with a centre, plain offsets for an
+    /// orthographic one. A matrix need not have any: its planes and corners are its own.
     pub fn window(&self) -> [f64; 4] {
         let (y, aspect) = match self.kind {
             LensKind::Perspective { fovy_deg, aspect } => (slope(fovy_deg), aspect),
@@ -167,8 +168,9 @@ impl Lens {
         [-y * aspect, y * aspect, -y, y]
     }
 
-    /// Height of the view at a depth, in world units; `None` for a matrix, which has no
-    /// window.
+    /// Height of the view at a depth, in world units.
+    ///
+    /// `None` for a matrix, which has no window.
     pub fn height_at(&self, depth: f64) -> Option<f64> {
         let [_, _, bottom, top] = self.window();
         let reach = if self.is_orthographic() { 1.0 } else { depth };
@@ -183,8 +185,9 @@ impl Lens {
         }
     }
 
-    /// The eight corners of the view volume in the frame's world, near ones
-    /// first; `None` if the far plane is infinite.
+    /// The eight corners of the view volume in the frame's world, near ones first.
+    ///
+    /// `None` if the far plane is infinite.
     pub fn corners(&self, frame: &Frame) -> Option<[DVec3; 8]> {
         if let LensKind::Matrix(matrix) = self.kind {
             return matrix.corners_about(&[]);

@@ -45,8 +45,9 @@ pub(super) struct Margin {
     depth: f64,
     /// The near corners' rays at unit depth, if there is no far plane.
     rays: [DVec3; 4],
-    /// The share of the derivation in f64: of the named planes, and of those that are
-    /// made about the rounded eye.
+    /// The share of the derivation in f64.
+    ///
+    /// The named planes first, then those that are made about the rounded eye.
     derived: [f64; 2],
     /// True if the near and the far plane are known as exactly as from a frame.
     of_frame: bool,

@@ -65,8 +65,10 @@ pub const MATRIX_ENTRIES: [&str; 16] = [
 /// Products of four entries of these sizes neither overflow nor lose a digit.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
 
-/// A far plane beyond this distance is an infinite one: it is no plane in f32, and
-/// engines write the largest f32 for none. Leaving one out returns more, never less.
+/// Distance beyond which a far plane counts as infinite.
+///
+/// Such a plane is none in f32, and engines write the largest f32 for none. Leaving it out
+/// returns more, never less.
 pub const FARTHEST: f64 = (f32::MAX / 2.0) as f64;
 
 /// Four numbers: a plane (normal and offset), or a point in homogeneous

@@ -32,8 +32,9 @@ named! {
     }
 }
 
-/// The factor c of the conservative epsilon that covers the rounding of the
-/// planes (f64 to f32) and of the plane test itself.
+/// Factor c of the conservative epsilon.
+///
+/// The epsilon covers the rounding of the planes (f64 to f32) and of the plane test itself.
 pub const DEFAULT_EPSILON: f64 = 8.0;
 
 defaults! {
@@ -62,10 +63,11 @@ impl PlaneOptions {
 pub struct Surroundings {
     /// World position of the scene's local zero.
     pub origin: DVec3,
-    /// Largest absolute local coordinate of any item, per axis. It bounds the
-    /// epsilon and the sums of the plane test; no guarantee holds for items beyond it.
-    /// Zero is unknown: the epsilon is then the volume's own (and too small without a
-    /// far plane), and sums are not checked for items.
+    /// Largest absolute local coordinate of any item, per axis.
+    ///
+    /// It bounds the epsilon and the sums of the plane test; no guarantee holds for items
+    /// beyond it. Zero is unknown: the epsilon is then the volume's own (and too small
+    /// without a far plane), and sums are not checked for items.
     pub reach: Vec3,
 }
 
@@ -99,10 +101,10 @@ impl Camera {
         self.volume_with(&[], options, around)
     }
 
-    /// The view volume with further planes (scene-local, of unit length), each
-    /// rounded to f32 and moved outward like the six: their own errors must be
-    /// small against 2^-24. Those that f32 cannot hold are left out, which is
-    /// always safe.
+    /// The view volume with further planes (scene-local, of unit length).
+    ///
+    /// Each plane is rounded to f32 and moved outward like the six: its own error must be
+    /// small against 2^-24. Planes that f32 cannot hold are left out, which is always safe.
     ///
     /// # Errors
     /// The errors of [`Camera::volume`]; more planes than a volume has.
@@ -130,9 +132,10 @@ impl Camera {
         Ok(ConvexVolumeF64::from_planes(&planes)?)
     }
 
-    /// The view volume in coordinates relative to the eye: the local eye
-    /// rounded to f32 becomes their zero, what the rounding left goes into the
-    /// offsets in f64, and each plane is rounded to f32 once.
+    /// The view volume in coordinates relative to the eye.
+    ///
+    /// The local eye, rounded to f32, becomes their zero; the rest of the rounding goes
+    /// into the offsets in f64, and each plane is rounded to f32 once.
     ///
     /// With a positive epsilon c the planes are moved outward as in
     /// [`Camera::volume`], with coordinates about the eye, not about the

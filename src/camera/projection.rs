@@ -32,8 +32,9 @@ macro_rules! precision {
 
             use super::*;
 
-            /// The projection matrix of a lens; NaN for a matrix, which is no projection
-            /// without a view.
+            /// The projection matrix of a lens.
+            ///
+            /// NaN for a matrix, which is no projection without a view.
             pub fn projection(lens: &Lens, clip: ClipSpace) -> $Mat {
                 let (near, is_gl) = (lens.near(), clip == ClipSpace::OpenGl);
                 // Depths of the first and the last plane in clip space.
@@ -96,6 +97,8 @@ macro_rules! precision {
                 [frame.u(), frame.v(), frame.n(), frame.eye].map(convert)
             }
 
+            /// The planes from the camera's frame.
+            ///
             /// The side planes pass through the eye along the window's edges (or, for an
             /// orthographic lens, stand beside it); near and far face each other.
             pub fn from_frame(frame: &Frame, lens: &Lens) -> Vec<(FrustumPlane, $Plane)> {
@@ -124,8 +127,10 @@ macro_rules! precision {
                 planes
             }
 
-            /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
-            /// the last column, of the frame and the eye as this precision has them.
+            /// The world-to-eye matrix, in this precision.
+            ///
+            /// Rows u, v, n with `-e.u`, `-e.v`, `-e.n` in the last column, all rounded to
+            /// this precision.
             pub fn view(frame: &Frame) -> $Mat {
                 let [u, v, n, e] = rounded(frame);
                 $Mat::from_cols(
@@ -136,8 +141,9 @@ macro_rules! precision {
                 )
             }
 
-            /// The six planes of the clip matrix: left, right, bottom, top, near,
-            /// far. A far plane at infinity comes out with a normal of zero or none.
+            /// The six planes of the clip matrix: left, right, bottom, top, near, far.
+            ///
+            /// A far plane at infinity comes out with a normal of zero or none.
             ///
             /// Gribb and Hartmann 2001, "Fast extraction of viewing frustum planes
             /// from the world-view-projection matrix".
@@ -165,8 +171,9 @@ precision!(
 );
 
 impl Frame {
-    /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
-    /// the last column.
+    /// The world-to-eye matrix.
+    ///
+    /// Rows u, v, n with `-e.u`, `-e.v`, `-e.n` in the last column.
     pub fn world_to_eye(&self) -> DMat4 {
         double::view(self)
     }

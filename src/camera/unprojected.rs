@@ -20,21 +20,24 @@ const SYMMETRIC: f64 = 1e-6;
 /// A view-projection matrix as a frame and a lens, rounded.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Unprojected {
-    /// The camera without a matrix. The eye of an orthographic lens is the centre of
-    /// the near plane.
+    /// The camera without a matrix.
+    ///
+    /// The eye of an orthographic lens is the centre of the near plane.
     pub camera: Camera,
     /// Clip-space depths of the near and the far plane: -1, 0 or 1.
     pub depths: [f64; 2],
-    /// True if the image is mirrored: y points down (Vulkan), or the world is
-    /// left-handed.
+    /// True if the image is mirrored.
+    ///
+    /// y points down (Vulkan), or the world is left-handed.
     pub is_mirrored: bool,
     /// Directions of clip-space x and y in the world, of unit length.
     pub image: [DVec3; 2],
     /// Cosine of the angle between the image's axes; 0 for a camera.
     pub shear: f64,
-    /// Change of clip-space depth across the axis of view, relative to the change of w
-    /// (of depth itself for an orthographic lens) along it; 0 for a camera, larger for
-    /// an oblique near plane.
+    /// Change of clip-space depth across the axis of view.
+    ///
+    /// Relative to the change of w (of depth itself for an orthographic lens) along it; 0
+    /// for a camera, larger for an oblique near plane.
     pub tilt: f64,
 }
 

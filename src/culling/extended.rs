@@ -15,8 +15,9 @@ use crate::geometry::{MAX_PLANES, PlaneF64};
 /// Rounding error of a sum of unit normals that is zero: some units of 2^-53 each.
 const RESIDUE: f64 = 1.0 / (1u64 << 49) as f64;
 
-/// The volume's bounds along the axes: up to six planes, fewer where it has no
-/// bound.
+/// The volume's bounds along the axes.
+///
+/// Up to six planes, fewer where it has no bound.
 ///
 /// Each is a sum of three faces, with positive weights, that leaves one axis
 /// of the normal, moved outward by what making it can cost at points within

@@ -16,7 +16,7 @@ use crate::geometry::{
 use crate::query::AnyVolume;
 
 use extended::farthest_corner;
-pub use extended::{bounds, extended};
+pub(crate) use extended::{bounds, extended};
 
 named! {
     /// The test of a box against the volume.
@@ -33,8 +33,9 @@ named! {
 }
 
 impl CullingTest {
-    /// The items as an index for this test has to hold them: the boxes, or for
-    /// `sphere` the cubes about their bounding spheres.
+    /// The items as an index for this test must hold them.
+    ///
+    /// The boxes, or for `sphere` the cubes about their bounding spheres.
     pub fn items<'a>(self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
         match self {
             CullingTest::Sphere => Cow::Owned(items.iter().map(sphere_cube).collect()),
@@ -135,8 +136,9 @@ impl Culling {
         all.filter(|culling| culling.check().is_ok())
     }
 
-    /// The view of a camera in a scene's local coordinates; the same view
-    /// serves every structure. O(m^3) for the m planes of the lens, a few
+    /// The view of a camera in a scene's local coordinates.
+    ///
+    /// The same view serves every structure. O(m^3) for the m planes of the lens, a few
     /// microseconds for `exact`.
     ///
     /// # Errors

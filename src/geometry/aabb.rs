@@ -34,8 +34,9 @@ impl Aabb {
         max: Vec3::NEG_INFINITY,
     };
 
-    /// The box between two corners; the empty set where `min` is above `max` on any
-    /// axis.
+    /// The box between two corners.
+    ///
+    /// The empty set where `min` is above `max` on any axis.
     pub const fn new(min: Vec3, max: Vec3) -> Self {
         Aabb { min, max }
     }
@@ -45,8 +46,9 @@ impl Aabb {
         Aabb::new(centre - half, centre + half)
     }
 
-    /// The smallest f32 box about `origin` that holds the f64 box exactly:
-    /// both bounds are rounded outward, so nothing inside is ever lost.
+    /// The smallest f32 box about `origin` that holds the f64 box exactly.
+    ///
+    /// Both bounds are rounded outward, so nothing inside is ever lost.
     ///
     /// Bounds beyond the range of f32 come out infinite; check
     /// [`Aabb::is_finite`].
@@ -56,8 +58,9 @@ impl Aabb {
         Aabb::new([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
-    /// Both corners in the world, where `origin` is the box's zero: rounded
-    /// outward too, in the rare case that f64 cannot hold the sum.
+    /// Both corners in the world, where `origin` is the box's zero.
+    ///
+    /// Rounded outward too, in the rare case that f64 cannot hold the sum.
     pub fn in_world(&self, origin: DVec3) -> (DVec3, DVec3) {
         let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
         let down = |axis: usize| sum_down(origin[axis], min[axis]);
@@ -65,8 +68,9 @@ impl Aabb {
         ([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
-    /// The box as seen from `eye`: each bound minus the eye's coordinate,
-    /// rounded to nearest and kept finite.
+    /// The box as seen from `eye`.
+    ///
+    /// Each bound minus the eye's coordinate, rounded to nearest and kept finite.
     ///
     /// Rounding is monotone and so is the clamp: a box within another stays
     /// within it, bound by bound. (Without the clamp an overflow times a zero
@@ -119,8 +123,9 @@ impl Aabb {
         other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
     }
 
-    /// Returns whether the two closed boxes share a point (touching counts).
-    /// An empty box shares none.
+    /// Returns whether the two closed boxes share a point.
+    ///
+    /// Touching counts. An empty box shares none.
     #[inline(always)]
     pub fn intersects(&self, other: &Aabb) -> bool {
         let overlap = self.min.cmple(other.max).all() && other.min.cmple(self.max).all();
@@ -178,8 +183,9 @@ impl Aabb {
         libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
     }
 
-    /// Largest absolute coordinate on each axis: how far from the local
-    /// origin anything in the box can be; zero for an empty box.
+    /// Largest absolute coordinate on each axis.
+    ///
+    /// Nothing in the box is farther from the local origin; zero for an empty box.
     pub fn reach(&self) -> Vec3 {
         if self.is_empty() {
             return Vec3::ZERO;

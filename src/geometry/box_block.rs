@@ -54,8 +54,9 @@ impl BoxBlock {
         Aabb::new(each([0, 1, 2], low).into(), each([3, 4, 5], high).into())
     }
 
-    /// The lane whose box is nearest to a point by the sum over axes; of several, the
-    /// first.
+    /// The lane whose box is nearest to a point by the sum over axes.
+    ///
+    /// The first of several.
     pub fn nearest(&self, p: Vec3) -> usize {
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let mut away = [0.0; LANES];
@@ -93,7 +94,6 @@ impl BoxBlock {
     }
 
     /// Minima by axis, then maxima.
-    #[cfg(feature = "cli")]
     #[inline(always)]
     pub(crate) fn rows(&self) -> &[[f32; LANES]; 6] {
         &self.rows
@@ -106,8 +106,9 @@ impl BoxBlock {
         [&self.rows[x], &self.rows[y], &self.rows[z]]
     }
 
-    /// The lanes that none of the f64 planes excludes: bit for bit
-    /// [`PlaneF64::excludes`], lane by lane.
+    /// The lanes that none of the f64 planes excludes.
+    ///
+    /// Bit for bit [`PlaneF64::excludes`], lane by lane.
     #[inline(always)]
     pub fn admitted_by_wide<'p>(
         &self,
@@ -129,8 +130,9 @@ impl BoxBlock {
         !(excluded as LaneMask)
     }
 
-    /// The lanes whose sphere none of the planes drops: bit for bit
-    /// [`Spheres::drops`](super::Spheres::drops), lane by lane.
+    /// The lanes whose sphere none of the planes drops.
+    ///
+    /// Bit for bit [`Spheres::drops`](super::Spheres::drops), lane by lane.
     #[inline(always)]
     pub fn admitted_as_spheres<'p, I: Isa>(
         &self,
@@ -246,8 +248,9 @@ fn joined(bits: &[u32; LANES]) -> LaneMask {
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
-/// Boxes in blocks, in the order in which they were pushed; the last block is
-/// filled up with empty boxes. 24 bytes a box.
+/// Boxes in blocks, in the order in which they were pushed.
+///
+/// The last block is filled up with empty boxes. 24 bytes per box.
 #[derive(Clone, Default, Debug)]
 pub struct BoxBlocks {
     blocks: Vec<BoxBlock>,
@@ -357,8 +360,9 @@ impl BoxBlocks {
         &self.blocks
     }
 
-    /// The blocks that hold the boxes `first..end`, each with the place of its
-    /// lane 0 and the lanes that belong to the range.
+    /// The blocks that hold the boxes `first..end`.
+    ///
+    /// Each with the position of its lane 0 and the lanes that belong to the range.
     #[inline(always)]
     pub fn range(
         &self,

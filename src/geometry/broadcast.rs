@@ -214,9 +214,10 @@ impl<I: Isa> Planes<I> for BallFrustum<'_, I> {
 
 /// THE plane test on sixteen boxes at once.
 impl BoxBlock {
-    /// The lanes that none of the planes of a mask excludes: bit for bit
-    /// [`Plane::excludes`](super::Plane::excludes), lane by lane. Lanes without a box come out as they
-    /// may.
+    /// The lanes that none of the planes of a mask excludes.
+    ///
+    /// Bit for bit [`Plane::excludes`](super::Plane::excludes), lane by lane. The bits of
+    /// lanes without a box are arbitrary.
     #[inline(always)]
     pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
         let mut kept = isa.keep_all();
@@ -228,9 +229,10 @@ impl BoxBlock {
         isa.kept(kept)
     }
 
-    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are
-    /// broadcast once for all of them, which pays where all planes are open and
-    /// registers are too few to keep them ([`BroadcastPlanes`](super::BroadcastPlanes)).
+    /// [`BoxBlock::admitted_by`] for four blocks.
+    ///
+    /// Each plane's numbers are broadcast once for all of them, which pays where all planes
+    /// are open and registers are too few to keep them.
     #[inline(always)]
     pub fn four_admitted_by<I: Isa>(
         isa: I,
@@ -250,9 +252,10 @@ impl BoxBlock {
         each(kept, |kept| isa.kept(kept))
     }
 
-    /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
-    /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`](super::Plane::contains)).
+    /// [`BoxBlock::admitted_by`] for nodes, with the planes open below each lane.
+    ///
+    /// A lane's word is `mask` without the planes that hold the whole box
+    /// ([`Plane::contains`](super::Plane::contains)).
     #[inline(always)]
     pub fn sorted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Sorted<I> {
         let mut kept = isa.keep_all();

@@ -115,10 +115,12 @@ impl ConvexVolume {
         Self::from_labelled_planes(&unnamed)
     }
 
-    /// A box as six planes: the items that no plane excludes are exactly those that
-    /// overlap it (closed bounds), because a plane along an axis evaluates to a
-    /// difference of two numbers, whose sign no rounding changes. Infinite bounds
-    /// count as the largest number. An empty box is a plane that nothing is inside of.
+    /// A box as six planes.
+    ///
+    /// The items that no plane excludes are exactly those that overlap it (closed bounds),
+    /// because a plane along an axis evaluates to a difference of two numbers, whose sign
+    /// no rounding changes. Infinite bounds count as the largest number. An empty box is a
+    /// plane that nothing is inside of.
     pub fn of_box(b: &Aabb) -> Self {
         let planes = (0..3).flat_map(|axis| {
             let normal = Vec3::AXES[axis];
@@ -188,15 +190,17 @@ impl ConvexVolume {
         }
     }
 
-    /// The six-plane box test: true unless one plane has the whole box on its
-    /// outer side. Conservative: boxes beside a frustum edge may pass. An
-    /// empty box is never seen. O(planes).
+    /// The six-plane box test: true unless a plane has the whole box outside.
+    ///
+    /// Conservative: boxes beside a frustum edge may pass. An empty box is never seen.
+    /// O(planes).
     pub fn sees(&self, b: &Aabb) -> bool {
         !b.is_empty() && !self.planes().iter().any(|plane| plane.excludes(b))
     }
 
-    /// Returns whether the point lies in the closed volume (the lecture's
-    /// `CullPointAgainstFrustum`, with inward normals). O(planes).
+    /// Returns whether the point lies in the closed volume.
+    ///
+    /// The lecture's `CullPointAgainstFrustum`, with inward normals. O(planes).
     pub fn contains_point(&self, p: Vec3) -> bool {
         self.planes().iter().all(|plane| plane.contains_point(p))
     }
@@ -262,8 +266,10 @@ macro_rules! planes_of {
                 &self.planes[..self.count]
             }
 
-            /// Plane `index` of a mask bit: like `planes()[index]`, but without a check
-            /// in the inner loop (a bit index is always below [`MAX_PLANES`]).
+            /// Plane `index` of a mask bit.
+            ///
+            /// Like `planes()[index]`, but without a check in the inner loop (a bit index
+            /// is always below [`MAX_PLANES`]).
             #[inline(always)]
             pub fn plane_of_bit(&self, index: u32) -> &$Plane {
                 &self.planes[index as usize % MAX_PLANES]

@@ -14,8 +14,10 @@ pub mod tests_arbitrary;
 
 pub use aabb::Aabb;
 pub use balls::{BallBlock, BallBlocks, Balls};
-pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, blocks_of};
-pub use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Planes, Sorted};
+pub use box_block::{BoxBlock, BoxBlocks};
+pub(crate) use box_block::{LANES, LaneMask};
+pub use broadcast::Planes;
+pub(crate) use broadcast::{BallFrustum, BallPlane, BroadcastPlane, BroadcastPlanes, Sorted};
 pub use convex_volume::{
     ConvexVolume, ConvexVolumeF64, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError,
 };

@@ -55,9 +55,10 @@ macro_rules! half_space {
                 ((self.normal.x * x.x + self.normal.y * x.y) + self.normal.z * x.z) + self.d
             }
 
-            /// The corner of `b` farthest along the normal (the p-vertex; Greene 1994,
-            /// "Detecting intersection of a rectangular solid and a convex
-            /// polyhedron", Graphics Gems IV, p. 74).
+            /// The corner of `b` farthest along the normal (the p-vertex).
+            ///
+            /// Greene 1994, "Detecting intersection of a rectangular solid and a convex
+            /// polyhedron", Graphics Gems IV, p. 74.
             #[inline(always)]
             pub fn p_vertex(&self, b: &Aabb) -> $Vector {
                 let pick =
@@ -80,15 +81,17 @@ macro_rules! half_space {
                 self.p_vertex(&Aabb::new(b.max, b.min))
             }
 
-            /// Returns whether the whole box lies strictly outside: its p-vertex evaluates
-            /// below zero. Touching is not outside.
+            /// Returns whether the whole box lies strictly outside.
+            ///
+            /// Its p-vertex evaluates below zero. Touching is not outside.
             #[inline(always)]
             pub fn excludes(&self, b: &Aabb) -> bool {
                 self.value_at(self.p_vertex(b)) < 0.0
             }
 
-            /// Returns whether the whole box lies inside: its n-vertex evaluates to at least
-            /// zero.
+            /// Returns whether the whole box lies inside.
+            ///
+            /// Its n-vertex evaluates to at least zero.
             #[inline(always)]
             pub fn contains(&self, b: &Aabb) -> bool {
                 self.value_at(self.n_vertex(b)) >= 0.0

@@ -9,8 +9,9 @@ pub const ROW_LANES: usize = 8;
 
 type Row = [f32; ROW_LANES];
 
-/// The planes as four rows: normal x, y, z, then d. 128 bytes. Lanes without a
-/// plane hold zeros: no constraint.
+/// The planes as four rows: normal x, y, z, then d.
+///
+/// 128 bytes. Lanes without a plane hold zeros: no constraint.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct PlaneRows {

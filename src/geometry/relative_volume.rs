@@ -33,8 +33,9 @@ impl RelativeVolume {
         Ok(RelativeVolume { eye, planes })
     }
 
-    /// The planes of a volume about an eye: the offsets become `n . eye + d`,
-    /// computed in f64 and rounded once.
+    /// The planes of a volume about an eye.
+    ///
+    /// The offsets become `n . eye + d`, computed in f64 and rounded once.
     ///
     /// # Errors
     /// An eye or an offset beyond f32.

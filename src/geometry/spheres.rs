@@ -10,8 +10,9 @@ use super::{Aabb, ConvexVolume, Plane};
 use crate::arithmetic::rounding::{difference_down, difference_up, round_up};
 use crate::kernel::each;
 
-/// The cube about a box's bounding sphere: what an index is built over when
-/// its items are to be tested as spheres.
+/// The cube about a box's bounding sphere.
+///
+/// An index over these cubes tests its items as spheres.
 ///
 /// The centre is the box's own, rounded; the radius reaches the farthest
 /// corner from there, rounded up; the cube's bounds are rounded outward. So the
@@ -38,17 +39,19 @@ pub fn sphere_cube(b: &Aabb) -> Aabb {
 pub struct Ball {
     /// Within the cube.
     pub centre: Vec3,
-    /// Never below the radius that the cube was made with; infinite if the
-    /// cube was cut off at the end of f32.
+    /// Radius, never below the one that the cube was made with.
+    ///
+    /// Infinite if the cube was cut off at the end of f32.
     pub radius: f32,
     /// Largest absolute coordinate of the cube.
     pub reach: f32,
 }
 
 impl Ball {
-    /// Half the sum and half the difference of the bounds. Each edge of the
-    /// cube is at least a diameter, so the shortest will do. The centre is held
-    /// between the bounds, from where halving a subnormal may push it.
+    /// The sphere in a cube: half the sum and half the difference of the bounds.
+    ///
+    /// Each edge of the cube is at least a diameter, so the shortest will do. The centre is
+    /// held between the bounds, from where halving a subnormal may push it.
     #[inline(always)]
     pub fn in_cube(cube: &Aabb) -> Ball {
         let (low, high) = (cube.min, cube.max);
@@ -81,8 +84,9 @@ pub struct SphereMargin {
     pub d: f32,
     /// Normal and offset divided by the length, rounded.
     pub unit: [f32; 4],
-    /// Distances from the plane that rounding may get wrong: per unit of reach, for a
-    /// reach of 0, and the largest reach without overflow.
+    /// Distances from the plane that rounding may get wrong.
+    ///
+    /// Per unit of reach, for a reach of 0, and the largest reach without overflow.
     pub doubt: [f32; 3],
 }
 
@@ -129,9 +133,10 @@ impl SphereMargin {
         }
     }
 
-    /// The value of the sphere's farthest point, or a little more: the ball is
-    /// surely outside if it is a number below zero. An overflow on the way
-    /// ends in an infinity or a NaN, which is no such number.
+    /// The value of the sphere's farthest point, or a little more.
+    ///
+    /// The ball is surely outside if it is a number below zero. An overflow on the way ends
+    /// in an infinity or a NaN, which is no such number.
     #[inline(always)]
     pub fn value_at(&self, normal: Vec3, ball: &Ball) -> f32 {
         let c = ball.centre;
@@ -190,8 +195,9 @@ impl Spheres {
         &self.planes
     }
 
-    /// Plane `index` of a mask bit with its margin, without a check in the
-    /// inner loop.
+    /// Plane `index` of a mask bit with its margin.
+    ///
+    /// Without a check in the inner loop.
     #[inline(always)]
     pub fn plane_of_bit(&self, index: u32) -> (&Plane, &SphereMargin) {
         let margin = &self.margins[index as usize % MAX_PLANES];

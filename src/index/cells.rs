@@ -1,9 +1,7 @@
 //! Cells of structures, for pictures, and the verdicts of a query about them.
 
 use crate::geometry::{Aabb, Plane};
-use crate::query::ItemId;
-#[cfg(feature = "cli")]
-use crate::query::{AnyVolume, Containment, NoRecorder, Predicate, each_volume};
+use crate::query::{AnyVolume, Containment, ItemId, NoRecorder, Predicate, each_volume};
 
 /// A node of a tree, or of any other nested division.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +19,6 @@ pub struct TreeCell<'a> {
 /// Verdicts about cells in depth-first order by a query with a volume of planes.
 ///
 /// `None` for a cell that is not tested because the cell around it is outside or inside.
-#[cfg(feature = "cli")]
 pub fn verdicts(cells: &[TreeCell<'_>], volume: AnyVolume<'_>) -> Vec<Option<Containment>> {
     each_volume!(volume, volume => {
         // Open planes of the cells of a level, as long as the cells around straddle.

@@ -104,8 +104,9 @@ pub struct Input<'a> {
     pub own_tree: Option<&'a PlaneTree>,
     /// The threads that the build may use; `None` for the current one.
     pub pool: Option<&'a Pool>,
-    /// True if the items are [cubes about spheres](crate::geometry::sphere_cube), for
-    /// structures that keep spheres beside the bounds. Answers do not depend on it.
+    /// True if the items are [cubes about spheres](crate::geometry::sphere_cube).
+    ///
+    /// For structures that keep spheres beside the bounds. Answers do not depend on it.
     pub spheres: bool,
     /// True if items come and go, for structures that can keep a lane for each.
     pub come_and_go: bool,
@@ -146,8 +147,9 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Number of threads that the build may use, at least 1. A structure that reads it
-    /// declares `threaded_build` in its [`Info`].
+    /// Number of threads that the build may use, at least 1.
+    ///
+    /// A structure that reads it declares `threaded_build` in its [`Info`].
     pub fn threads(&self) -> usize {
         self.pool.map_or(1, Pool::threads)
     }
@@ -246,8 +248,10 @@ pub trait RegionIndex: Sized + Send + Sync {
     }
 }
 
-/// Queries as callers write them, provided for every structure. They use the best
-/// [`Kernel`] of this machine. A volume is a frustum in any form, a point or a box.
+/// Queries as callers write them, provided for every structure.
+///
+/// They use the best [`Kernel`] of this machine. A volume is a frustum in any form, a point
+/// or a box.
 ///
 /// ```
 /// use cullbench::geometry::Aabb;

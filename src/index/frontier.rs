@@ -27,8 +27,9 @@ pub fn is_far(items: usize) -> bool {
     items > NEAR
 }
 
-/// The entries of a list that are prefetched before its first entry is processed:
-/// most entries of a small view.
+/// The entries of a list that are prefetched before its first entry is processed.
+///
+/// Most entries of a small view.
 #[inline(always)]
 pub fn first_ahead(far: bool) -> Range<usize> {
     0..if far { AHEAD } else { 0 }

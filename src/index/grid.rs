@@ -22,8 +22,9 @@ const MOST_CELLS: f64 = 1024.0;
 /// Cells that are all tested: the bounds of the centres that matter take longer.
 const FEW_CELLS: usize = 32;
 
-/// A uniform grid (Bentley and Friedman 1979, "Data structures for range
-/// searching"): cells in rows along x, items in the order of their cells.
+/// A uniform grid: cells in rows along x, items in the order of their cells.
+///
+/// Bentley and Friedman 1979, "Data structures for range searching".
 pub struct UniformGrid {
     /// Bounds of the centres, divided into cells.
     centres: Aabb,

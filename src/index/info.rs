@@ -24,16 +24,19 @@ pub struct Info {
     pub kind: Kind,
     /// Author of the code.
     pub origin: Origin<&'static str>,
-    /// [`RegionIndex::refit`](super::RegionIndex::refit) takes over items that
-    /// have moved; otherwise it always declines.
+    /// True if [`refit`](super::RegionIndex::refit) takes over items that have moved.
+    ///
+    /// Otherwise it always declines.
     pub refits: bool,
-    /// [`RegionIndex::tree_order`](super::RegionIndex::tree_order): answers
-    /// may be ranges of the structure's own order.
+    /// True if answers may be ranges of the structure's own order.
+    ///
+    /// The order is [`RegionIndex::tree_order`](super::RegionIndex::tree_order).
     pub ranges: bool,
     /// A build makes use of several threads.
     pub threaded_build: bool,
-    /// Timed if named, or with `all`, and not part of the list `default`: a form for
-    /// comparison, or one that is always another of the list.
+    /// True if only timed when named, or with `all`; not part of the list `default`.
+    ///
+    /// A form for comparison, or one that is always another of the list.
     pub on_request: bool,
     /// Timed if named, or by default where items move: its one advantage.
     pub for_motion: bool,

@@ -42,8 +42,9 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
     Ok(ids)
 }
 
-/// An item during a build: bounds and id together, so that a level of the build is
-/// one pass over memory.
+/// An item during a build: bounds and id together.
+///
+/// A level of the build is then one pass over memory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Record {
     /// Bounds of the item.
@@ -109,8 +110,10 @@ impl Positions {
         self.0[id as usize] = position;
     }
 
-    /// Prefetches positions and bounds of the moved item two distances ahead of the
-    /// i-th; returns the position of the one a single distance ahead.
+    /// Prefetches the moved items that follow the i-th.
+    ///
+    /// Positions and bounds of the one two distances ahead. Returns the position of the one
+    /// a single distance ahead.
     #[inline(always)]
     pub fn ahead(&self, items: &[Aabb], moved: &[ItemId], i: usize) -> Option<usize> {
         if let Some(&id) = moved.get(i + 2 * MOVED_AHEAD)

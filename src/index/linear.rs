@@ -17,8 +17,9 @@ use crate::query::{
 };
 use crate::threads::Workers;
 
-/// The plain loop over an array of boxes, which ends the test of a box at the first
-/// plane that excludes it. O(n) per query.
+/// The plain loop over an array of boxes.
+///
+/// The test of a box ends at the first plane that excludes it. O(n) per query.
 pub struct LinearScalar {
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
@@ -68,6 +69,7 @@ const BLOCKS_PER_CALL: usize = 1024;
 const LEAST_SHARED: usize = 8 * BLOCKS_PER_CALL;
 
 /// The scan over blocks: all planes against sixteen boxes at once, no early exit.
+///
 /// O(n) per query, with a constant several times smaller.
 pub struct Linear {
     boxes: BoxBlocks,

@@ -54,31 +54,28 @@ mod textbook;
 mod tree;
 mod wide;
 
+pub use crate::spec::SpecError;
+pub use crate::threads::Pool;
 pub use build::bsp::{Bsp, BspParams, PlaneSource};
-#[cfg(feature = "cli")]
 pub(crate) use build::bsp_split_planes::by_surface_area;
 pub use build::bvh::{Bvh, BvhParams, BvhPreset};
 pub use build::cells::{CellParams, Octree, Quadtree};
 pub(crate) use build::ploc;
 pub use cells::TreeCell;
-#[cfg(feature = "cli")]
 pub(crate) use cells::verdicts;
 pub(crate) use contract::check_range;
 pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex};
-pub(crate) use erased::QueryMany;
-pub use erased::{DynIndex, Execution, UpdatePolicy, WithKernel, caught};
+pub use erased::{DynIndex, Execution, UpdatePolicy, caught};
+pub(crate) use erased::{QueryMany, WithKernel};
 pub use grid::UniformGrid;
 pub use info::{Info, Kind, Origin};
-#[cfg(feature = "cli")]
 pub(crate) use items::Record;
 pub use items::{IdSet, indexable};
 pub use linear::{Linear, LinearParams, LinearScalar};
-#[cfg(feature = "cli")]
 pub(crate) use registry::{DEFAULT, MOTION};
 pub use registry::{Registry, Row, StructureSpec};
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
 pub use tree::Tree;
 use tree::TreeBuilder;
-#[cfg(feature = "cli")]
 pub(crate) use tree::node::{NEAR, Stack};
 pub use wide::{Auto, AutoParams, BlockOrder, Moving, Wide, WideParams};

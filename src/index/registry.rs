@@ -112,7 +112,7 @@ impl Row {
 /// use cullbench::index::{Registry, Wide};
 /// let structures = Registry::empty().with::<Wide>().structures("wide:order=morton")?;
 /// assert_eq!(structures[0].row.info.name, "wide");
-/// # Ok::<(), cullbench::spec::SpecError>(())
+/// # Ok::<(), cullbench::index::SpecError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Registry {
@@ -134,8 +134,9 @@ impl Registry {
         Registry { rows: Vec::new() }
     }
 
-    /// All structures of this build: the crate's own and, with the feature
-    /// `peers`, those of other crates.
+    /// All structures of this build.
+    ///
+    /// The crate's own and, with the feature `peers`, those of other crates.
     pub fn builtin() -> Registry {
         let own = Registry::empty()
             .with::<LinearScalar>()
@@ -250,9 +251,11 @@ impl Registry {
         meant.map(|row| self.structure(row.info.name)).collect()
     }
 
-    /// The structures of a comma-separated list, in which `all` are all of them and
-    /// `motion` those that are not [on request](Info::on_request), and `default` those of
-    /// them that are of use in [still scenes](Info::for_motion) too.
+    /// The structures of a comma-separated list.
+    ///
+    /// `all` are all of them, `motion` those that are not [on request](Info::on_request),
+    /// and `default` those of `motion` that are of use in [still scenes](Info::for_motion)
+    /// too.
     ///
     /// # Errors
     /// The errors of [`Registry::structure`]; an empty list, a structure named twice.
@@ -291,16 +294,18 @@ pub struct StructureSpec {
     pub row: Row,
     /// All parameters, defaults filled in.
     pub params: Value,
-    /// Kernel and threads: the best kernel and one thread unless changed by
-    /// [`StructureSpec::by`].
+    /// Kernel and threads.
+    ///
+    /// The best kernel and one thread unless changed by [`StructureSpec::by`].
     pub execution: Execution,
     /// Work of a frame of a motion.
     pub policy: UpdatePolicy,
 }
 
 impl StructureSpec {
-    /// A structure of the built-in registry; [`Registry::structure`] finds
-    /// those of others.
+    /// A structure of the built-in registry.
+    ///
+    /// [`Registry::structure`] finds those of others.
     ///
     /// # Errors
     /// The errors of [`Registry::structure`].
@@ -354,9 +359,10 @@ impl StructureSpec {
         caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }
 
-    /// Updates an index after items have moved: by refitting if the structure can, else
-    /// by a new build. True for a refit. There are as many items as it was built over; another
-    /// number needs [`StructureSpec::build`].
+    /// Updates an index after items have moved.
+    ///
+    /// Refits if the structure can, else builds again. True for a refit. There are
+    /// as many items as it was built over; another number needs [`StructureSpec::build`].
     ///
     /// # Errors
     /// A moved item with a NaN or infinite bound, or one that is not among `items`: the index

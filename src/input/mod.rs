@@ -8,17 +8,13 @@ mod file;
 mod note;
 mod table;
 
-pub(crate) use error::gigabytes;
-pub use error::{InputError, Result, bare};
+pub use error::{InputError, Result, bare, gigabytes};
 pub use file::{held_files, hold_files, is_readable, names_file, pipes, read_file, stand_in};
-#[cfg(feature = "cli")]
-pub(crate) use note::unheard;
-pub(crate) use note::{note, note_counted, warn};
-pub use note::{tell_notes, tell_warnings};
+pub use note::{note, note_counted, tell_notes, tell_warnings, unheard, warn};
 pub use table::{Row, TableReader};
 
 /// A finite f64, or what was expected.
-pub(crate) fn finite(text: &str) -> Result<f64, &'static str> {
+pub fn finite(text: &str) -> Result<f64, &'static str> {
     let number = |text: &str| text.parse::<f64>().ok();
     let is_comma = || text.contains(',') && number(&text.replacen(',', ".", 1)).is_some();
     match number(text) {

@@ -17,19 +17,19 @@ pub fn tell_notes(tell: fn(&str)) {
 }
 
 /// One line about an input that is no error.
-pub(crate) fn note(text: &str) {
+pub fn note(text: &str) {
     once(format!("note: {text}"), |(tell, ..), line| tell(&line));
 }
 
 /// A line for each count above zero of what it counts and what was done with it.
-pub(crate) fn note_counted<const N: usize>(file: &str, rows: [(usize, &str, &str); N]) {
+pub fn note_counted<const N: usize>(file: &str, rows: [(usize, &str, &str); N]) {
     for (count, one, what) in rows.into_iter().filter(|row| row.0 > 0) {
         note(&format!("{file}: {} {what}", counted(count, one)));
     }
 }
 
 /// Holds one line about a doubtful input for [`tell_warnings`].
-pub(crate) fn warn(text: &str) {
+pub fn warn(text: &str) {
     once(format!("warning: {text}"), |(.., held), line| {
         held.push(line)
     });
@@ -47,8 +47,7 @@ pub fn tell_warnings() {
 }
 
 /// Does something without its notes and warnings.
-#[cfg(feature = "cli")]
-pub(crate) fn unheard<T>(work: impl FnOnce() -> T) -> T {
+pub fn unheard<T>(work: impl FnOnce() -> T) -> T {
     let mut kept = None;
     listening(|listener| kept = listener.take());
     let done = work();

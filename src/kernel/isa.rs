@@ -119,9 +119,10 @@ pub trait Piece<I: Isa> {
     fn run(self, isa: I) -> Self::Output;
 }
 
-/// Appends rows and some lanes of rows to a list that has room for all of them
-/// from the start, without checks in between. The length of the list is set when the
-/// packer is dropped.
+/// Appends rows and some lanes of rows to a list.
+///
+/// The list has room for all of them from the start; nothing is checked in between. Its
+/// length is set when the packer is dropped.
 pub trait Pack<'a, I: Isa> {
     /// Reserves room for `words` words, and for the rest of a row behind them.
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self;

@@ -23,14 +23,14 @@ mod machine;
 use std::fmt;
 use std::sync::OnceLock;
 
-pub use inlined::{each, pairs};
-pub use isa::{Isa, LANES, LaneMask, Pack, Piece, first_lanes};
-pub use machine::{extend, extend_from_range, prefetch};
+pub(crate) use inlined::{each, pairs};
+pub(crate) use isa::first_lanes;
+pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
+pub(crate) use machine::{extend, extend_from_range, prefetch};
 pub use plain::Plain;
 
 named! {
-    /// An instruction set that queries are compiled for, from the smallest to the
-    /// largest.
+    /// An instruction set that queries are compiled for, from smallest to largest.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
     pub enum Kernel, KERNELS {
         Portable = "portable",
@@ -40,8 +40,9 @@ named! {
     }
 }
 
-/// A piece of work that [`Kernel::run`] compiles for each instruction set, whose
-/// vectors it is given as `isa`.
+/// A piece of work that [`Kernel::run`] compiles for each instruction set.
+///
+/// Its argument `isa` has the vectors of the set.
 ///
 /// `run` and all hot functions in it must be `#[inline(always)]`: a function that is not
 /// inlined is compiled for the portable set.
@@ -72,8 +73,10 @@ impl Kernel {
         Kernel::available().last().unwrap_or(Kernel::Portable)
     }
 
-    /// Does the work with this instruction set, or with the portable one where
-    /// the processor lacks it. The result is the same either way.
+    /// Does the work with this instruction set.
+    ///
+    /// With the portable one where the processor lacks it. The result is the same either
+    /// way.
     #[inline(always)]
     pub fn run<W: Work>(self, work: W) -> W::Output {
         machine::run(self, work)

@@ -37,23 +37,25 @@ pub struct ReportCell {
     pub status: Status,
     /// Why, where the status is not ok.
     pub reason: Option<String>,
-    /// Fastest first; cells that no test tells apart share a rank. Null where
-    /// there is no time.
+    /// Rank by time, 1 for the fastest; null where there is no time.
+    ///
+    /// Cells that no test tells apart share a rank.
     pub rank: Option<usize>,
     /// Basis of the metrics of time.
     #[serde(default)]
     pub times: CellTimes,
     /// Metrics by name; one that was not measured is absent.
     pub metrics: BTreeMap<String, Metric>,
-    /// How the answers differ from the exact truth; null where nothing was
-    /// answered.
+    /// Errors of the answers against the exact truth; null where nothing was answered.
     pub error: Option<Judged>,
     /// Metrics that were not measured of an ok cell, each with its reason.
     pub left_out: Vec<String>,
     /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
-    /// Choice of a structure that chooses, and what it left out; frames in which one
-    /// was built again as it could not refit. Absent of any other.
+    /// Choice of a structure that chooses, and what it left out.
+    ///
+    /// Also frames in which a structure was built again as it could not refit. Absent of
+    /// any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chose: Option<String>,
 }

@@ -30,8 +30,9 @@ impl Lap {
     }
 }
 
-/// Both clocks, read together. The CPU clock is read innermost: it is the one
-/// that ranks.
+/// Both clocks, read together.
+///
+/// The CPU clock is read innermost: it is the one that ranks.
 pub struct Stopwatch {
     wall: Instant,
     process: Option<ProcessTime>,

@@ -119,8 +119,9 @@ impl Machine {
         ))
     }
 
-    /// Bytes that surely push everything else out of the caches: twice the
-    /// last level, at least 64 MiB.
+    /// Bytes that surely push everything else out of the caches.
+    ///
+    /// Twice the last level, at least 64 MiB.
     pub fn cache_sweep_bytes(&self) -> usize {
         let last = self.caches.iter().map(|c| c.bytes).max().unwrap_or(0);
         usize::try_from((2 * last).max(64 << 20)).unwrap_or(usize::MAX)

@@ -32,8 +32,9 @@ pub struct Effort {
     pub rounds: [usize; 2],
     /// CPU time of a task in one process, ns.
     pub task_ns: f64,
-    /// Time in which a plain loop over all items answers the timed cameras, ns:
-    /// decides on their number.
+    /// Time in which a plain loop over all items answers the timed cameras, ns.
+    ///
+    /// Decides on the number of timed cameras.
     pub pass_ns: f64,
     /// Additional measurements.
     pub extras: Extras,

@@ -13,8 +13,9 @@ use crate::path::evenly;
 use crate::query::{AnyVolume, ItemId, QueryCost};
 use crate::scene::Scene;
 
-/// A structure with its two indexes: over the items (what does the camera
-/// see) and over the regions (where is the camera).
+/// A structure with its two indexes: over the items and over the regions.
+///
+/// The first answers what the camera sees, the second where the camera is.
 #[derive(Debug)]
 pub struct Subject {
     /// Structure, parameters, kernel and threads.
@@ -32,8 +33,9 @@ pub struct Built {
     pub items: Box<dyn DynIndex>,
     /// `None` where the regions are the items as they are indexed.
     regions: Option<Box<dyn DynIndex>>,
-    /// CPU time of one build over the items, ms; wall time
-    /// where builds have several threads.
+    /// CPU time of one build over the items, ms.
+    ///
+    /// Wall time where builds have several threads.
     pub build_ms: f64,
     /// Memory of the index over the items.
     pub memory: MemoryUsage,
@@ -85,8 +87,9 @@ pub(super) fn original(label: &str) -> &str {
 const AGAIN_BELOW_MS: f64 = 50.0;
 
 impl Subject {
-    /// Builds the structure over the items as a culling test has them. A panic or a
-    /// refusal becomes its verdict.
+    /// Builds the structure over the items as a culling test has them.
+    ///
+    /// A panic or a refusal becomes its verdict.
     pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene, test: CullingTest) -> Subject {
         let built = guarded(|| build(&spec, scene, test)).unwrap_or_else(Err);
         Subject {

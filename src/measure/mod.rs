@@ -3,17 +3,17 @@
 //! Independent of how structures work and of how results are written.
 //!
 //! A [`Plan`] has groups of cells: a group is a scene, a path, a cache state and a culling
-//! test ([`GroupKey`]), a cell is one structure in it. [`measure_scene`] runs in each process
+//! test ([`GroupKey`]), a cell is one structure in it. `measure_scene` runs in each process
 //! of a run, and per group:
 //!
 //! 1. a [`Workload`]: the queries along the path; and [`Subject`]s: the built structures;
-//! 2. [`measure`]: in the first process [`count_pass`] and [`judge`], in the others a
+//! 2. [`measure`]: in the first process `count_pass` and `judge`, in the others a
 //!    comparison of digests; then the timed pass, [`timed`], of [`TimedTask`]s by a
 //!    [`Schedule`], in which the lower bounds [`BOUNDS`] take part;
 //! 3. a [`Part`]: the results of this process for this group.
 //!
 //! [`Group::of`] derives the [`ReportCell`]s of a group from the parts of all processes.
-//! Other studies time their own tasks with [`timed`] and [`OverProcesses`].
+//! Other studies time their own tasks with [`timed`] and `OverProcesses`.
 //!
 //! | files | contents |
 //! |---|---|
@@ -56,30 +56,33 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Aabb;
 use crate::index::{BuildError, caught};
 use crate::query::{AnyVolume, ItemId};
+pub use crate::statistics::{median, slope, trimmed_mean};
 use crate::verify::{Fault, Trial, explain_visibility};
 
 pub use bounds::{BOUNDS, Bound};
 pub use cell::{CellTimes, Metric, PathInfo, ReportCell, SamplesRef, SceneInfo, TwinEntry};
 pub use clock::{Lap, Stopwatch};
-#[cfg(feature = "cli")]
-pub(crate) use count::blamed;
-pub use count::{Answer, Counted, Judged, count_pass, judge, spread};
+pub use count::{Answer, Judged};
+pub(crate) use count::{blamed, count_pass, judge, spread};
 pub use environment::{Machine, Source, Toolchain};
-pub use experiment::{
-    Effort, ExperimentError, Extras, PathOf, Plan, PlannedScene, Share, measure_loaded,
-    measure_scene,
-};
+pub use experiment::{Effort, ExperimentError, Extras, Plan, PlannedScene};
+pub(crate) use experiment::{PathOf, Share, measure_loaded, measure_scene};
 pub use frames::measure;
-pub use group::{GroupPlan, NO_ITEMS};
+pub use group::GroupPlan;
+pub(crate) use group::NO_ITEMS;
 pub use index_under_test::{Built, Subject, move_share};
-pub use key::{CellKey, GroupKey, TaskKey, TaskKind};
-pub use metrics::{METRICS, MetricInfo};
-pub use over_processes::{OverProcesses, ProcessTimes};
-pub use process_result::{Known, Measured, Part, SubjectPart, TaskPart, TaskSamples};
-pub use results::{Group, YARDSTICK};
-pub use schedule::{CLOCK_NS, KeyedSchedule, Protocol, Schedule, TaskPlan, cameras_within};
-pub use study::{Setting, StudyPlan};
-pub use task::{Ask, AskMany, TimedTask};
+pub use key::{CellKey, GroupKey, TaskKind};
+pub(crate) use metrics::METRICS;
+pub(crate) use over_processes::{OverProcesses, ProcessTimes};
+pub(crate) use process_result::TaskSamples;
+pub use process_result::{Known, Part, SubjectPart, TaskPart};
+pub use results::Group;
+pub(crate) use results::YARDSTICK;
+pub use schedule::{KeyedSchedule, Protocol, Schedule, TaskPlan, cameras_within};
+pub use study::Setting;
+pub(crate) use study::StudyPlan;
+pub(crate) use task::Ask;
+pub use task::TimedTask;
 pub use timing::{Sample, Timed, timed};
 pub(crate) use workload::input_for;
 pub use workload::{Workload, WorkloadError, input_of};

@@ -10,6 +10,7 @@ use super::{Part, Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
 
 /// Times of the tasks of a schedule in one process, in the order of the schedule.
+///
 /// Plain data that goes from process to process.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ProcessTimes {
@@ -32,12 +33,14 @@ impl ProcessTimes {
     }
 }
 
-/// Times of the same tasks in several processes, found by the keys of the tasks.
+/// Times of the same tasks in several processes, by the keys of the tasks.
+///
 /// A key is the position in the schedule, or a value of the study's own.
 pub struct OverProcesses<K = usize> {
     keys: Vec<K>,
-    /// Per task, ln ns in each process: empty without times, or the verdict of
-    /// the first process in which it failed.
+    /// Per task, ln ns in each process.
+    ///
+    /// Empty without times; the verdict of the first process in which the task failed.
     logs: Vec<Result<Vec<f64>, Verdict>>,
     /// The first task with times: what slows it slows all.
     reference: Vec<f64>,
@@ -99,8 +102,9 @@ impl<K: PartialEq> OverProcesses<K> {
         one_run(&self.reference, self.own(task))
     }
 
-    /// ln of the time of a task in each process, ns, all brought to the speed that
-    /// [`Self::ns`] shows; empty without times.
+    /// ln of the time of a task in each process, ns.
+    ///
+    /// All brought to the speed that [`Self::ns`] shows; empty without times.
     pub fn ln_ns(&self, task: impl Borrow<K>) -> Vec<f64> {
         let speed = one_run(&self.reference, &self.reference);
         let speed = speed.map_or(f64::NAN, |found| found.value.ln());
@@ -109,8 +113,9 @@ impl<K: PartialEq> OverProcesses<K> {
             .collect()
     }
 
-    /// Time of `task` / time of `other`: the ratio of the two that [`Self::ns`]
-    /// gives.
+    /// Time of `task` / time of `other`.
+    ///
+    /// The ratio of the two that [`Self::ns`] gives.
     pub fn ratio(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> Option<Estimate> {
         ratio(&self.reference, self.own(task), self.own(other))
     }

@@ -93,8 +93,10 @@ pub struct TaskPart {
     pub rounds_ns: Vec<f64>,
     /// ln of the wall ns per query: interquartile mean over the rounds.
     pub wall_ln_ns: Option<f64>,
-    /// CPU ns per query of groups of cameras that are the same for all tasks,
-    /// median over the rounds; empty below twenty of them. Of frames: of each frame.
+    /// CPU ns per query of groups of cameras, median over the rounds.
+    ///
+    /// The groups are the same for all tasks; empty below twenty of them. Of frames: of
+    /// each frame.
     pub tail_ns: Vec<f64>,
 }
 

@@ -22,8 +22,9 @@ use crate::statistics::median;
 pub struct Protocol {
     /// Rounds of a task, at least and at most.
     pub rounds: [usize; 2],
-    /// CPU time of a task in one process, warm-up included, ns: decides on the
-    /// number of rounds between those bounds.
+    /// CPU time of a task in one process, warm-up included, ns.
+    ///
+    /// Decides on the number of rounds between those bounds.
     pub task_ns: f64,
     /// Most cameras that are timed, evenly spread over the path.
     pub cameras: usize,

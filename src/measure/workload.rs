@@ -15,8 +15,9 @@ use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, Sought};
 
-/// Input of a structure: items of a scene, as they are or as a culling test has
-/// them indexed, with the scene's own partition.
+/// Input of a structure: items of a scene with the scene's own partition.
+///
+/// The items as they are, or as a culling test has them indexed.
 pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     Input::new(items).own_tree(scene.own_tree.as_ref())
 }
@@ -132,8 +133,9 @@ impl<'a> Workload<'a> {
         input.come_and_go(self.motion.is_some())
     }
 
-    /// Region search at the eye of a camera: the answer of `ask`, made exact by
-    /// [`Scene::search`].
+    /// Region search at the eye of a camera.
+    ///
+    /// The answer of `ask`, made exact by [`Scene::search`].
     #[inline]
     pub fn search(
         &self,

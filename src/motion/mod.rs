@@ -17,8 +17,8 @@ use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox, hex};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
-
 pub use laws::REMOVED;
+
 use laws::{Law, World};
 use recorded::Recorded;
 
@@ -189,7 +189,6 @@ impl Motion {
     }
 
     /// Warns or notes where frames and cameras without times differ in number.
-    #[cfg(feature = "cli")]
     pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
         let (seen, lines) = (self.frames * views.max(1), path.lines.len());

@@ -31,8 +31,9 @@ fn unit(v: &ExactVector) -> ExactVector {
 }
 
 impl Oracle {
-    /// Camera level: the view volume of a pose and a lens, in coordinates about
-    /// `origin`, as real numbers.
+    /// Camera level: the view volume of a pose and a lens, as real numbers.
+    ///
+    /// In coordinates about `origin`.
     ///
     /// Every verdict is that about the real volume, or a touch marked as
     /// undecided, where the two cannot be distinguished: pose and lens count as

@@ -30,8 +30,9 @@ pub(super) enum Extent {
     /// No point satisfies all constraints.
     #[default]
     Empty,
-    /// Points, but none that satisfies them all strictly: nothing is more than
-    /// touched.
+    /// Points, but none that satisfies all constraints strictly.
+    ///
+    /// Nothing is more than touched.
     Flat,
     /// An interior.
     Solid,

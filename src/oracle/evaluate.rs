@@ -25,8 +25,9 @@ impl Precision {
         tolerance: 0.0,
     };
 
-    /// About 250 bits, of which 100 are kept as a guard: for planes that only
-    /// exist as real numbers (roots, tangents).
+    /// About 250 bits, 100 of which are a guard.
+    ///
+    /// For planes that only exist as real numbers (roots, tangents).
     pub const CAMERA: Precision = Precision {
         terms: 5,
         tolerance: f64::from_bits((1023 - 150) << 52),

@@ -32,8 +32,9 @@ pub enum Verdict {
 pub struct Judgement {
     /// The verdict, as far as it could be proved.
     pub verdict: Verdict,
-    /// At camera level: closer to a tie than the precision of the camera's
-    /// planes (2^-150 of the magnitudes involved), and so called a touch.
+    /// True for a tie too close to decide at camera level, which counts as a touch.
+    ///
+    /// Closer than the precision of the camera's planes: 2^-150 of the magnitudes involved.
     pub undecided: bool,
 }
 
@@ -99,8 +100,9 @@ impl Oracle {
         }
     }
 
-    /// The verdict about a box with finite bounds (what it is about others
-    /// means nothing). An inverted box is empty, and so OUT.
+    /// The verdict about a box with finite bounds.
+    ///
+    /// For other bounds it means nothing. An inverted box is empty, and so OUT.
     pub fn verdict(&self, b: &Aabb) -> Verdict {
         self.judge(b).verdict
     }
@@ -133,8 +135,9 @@ impl Oracle {
         }
     }
 
-    /// Depth of the box in the volume (positive) or a lower bound of its distance
-    /// (negative), world units.
+    /// Depth of the box in the volume (positive), world units.
+    ///
+    /// Negative: a lower bound of its distance.
     ///
     /// The least value of any certificate of unit length, to a millionth of itself.
     /// For a box that is IN this is the length of the shortest move that makes it
@@ -178,8 +181,9 @@ impl Oracle {
         depths.fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns whether one plane has the whole box on its outer side, exactly: a
-    /// six-plane test without any error.
+    /// Returns whether one plane has the whole box on its outer side, exactly.
+    ///
+    /// A six-plane test without any error.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
         let [min, max] = [b.min, b.max].map(|corner| corner.as_dvec3());
         let corners = Corners { min, max };

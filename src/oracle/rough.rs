@@ -133,8 +133,9 @@ impl RoughSpaces {
         self.determinants[(i * self.normals.len() + j) * self.normals.len() + l]
     }
 
-    /// The sign of the offset of a combination of four that leaves no normal,
-    /// if it is certain; positive also if there is no such combination.
+    /// The sign of the offset of a combination of four that leaves no normal.
+    ///
+    /// `None` if it is not certain; positive also if there is no such combination.
     pub fn quadruple(&self, [i, j, l, m]: [usize; 4]) -> Option<i32> {
         let weights = [
             self.determinant(j, l, m),
@@ -160,8 +161,9 @@ impl RoughSpaces {
         [(j, l), (l, i), (i, j)].map(|(a, b)| self.cross(a, b)[axis])
     }
 
-    /// The bound of a combination of three along an axis; `None` if
-    /// rounding hides too much of it.
+    /// The bound of a combination of three along an axis.
+    ///
+    /// `None` if rounding hides too much of it.
     pub fn bound(&self, triple: [usize; 3], axis: usize) -> Option<RoughBound> {
         let weights = self.weights_of_triple(triple, axis);
         let [i, j, l] = triple;
@@ -186,9 +188,9 @@ impl RoughSpaces {
         })
     }
 
-    /// Returns whether the line in which two boundaries meet certainly misses the
-    /// volume. On the line, in homogeneous coordinates, every other constraint
-    /// is `a + t*b >= 0`.
+    /// Returns whether the line in which two boundaries meet surely misses the volume.
+    ///
+    /// On the line, in homogeneous coordinates, every other constraint is `a + t*b >= 0`.
     pub fn edge_misses(&self, i: usize, j: usize) -> bool {
         let along = self.cross(i, j);
         let weight = dot(along, along);

@@ -21,7 +21,8 @@ use crate::scene::{self, PlaceView, Scene, SeededRng, WorldBox, memory};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
-pub use facts::{CameraFacts, MatrixFacts, is_downward, warnings};
+pub use facts::{CameraFacts, MatrixFacts};
+pub(crate) use facts::{is_downward, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
 /// The path through a scene when none is named.
@@ -238,8 +239,9 @@ impl Scene {
     }
 }
 
-/// Makes or reads a path: `orbit:frames=512`, or a cameras CSV. An existing
-/// file wins over a name.
+/// Makes or reads a path: `orbit:frames=512`, or a cameras CSV.
+///
+/// An existing file wins over a name.
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
@@ -247,8 +249,10 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
     load_scaled(source, scene, defaults, None)
 }
 
-/// [`load`] with the scale of the lens that an earlier load of this path has
-/// found ([`CameraPath::lens_scale`]), which is then not looked for again.
+/// [`load`] with a known scale of the lens.
+///
+/// The scale is the one that an earlier load of this path has found
+/// ([`CameraPath::lens_scale`]); it is not searched again.
 ///
 /// # Errors
 /// The errors of [`load`].

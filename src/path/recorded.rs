@@ -13,6 +13,7 @@ use crate::shown::shortened;
 
 defaults! {
     /// Values for columns that a file does not have, and lenses of generated paths.
+    ///
     /// `None` leaves the choice to the path.
     #[derive(Clone, Copy, PartialEq, Debug)]
     pub struct LensDefaults {
@@ -77,10 +78,11 @@ impl LensDefaults {
 /// The far plane in near planes, for cameras without a near plane.
 const FAR_IN_NEARS: f64 = 1000.0;
 
-/// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
-/// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
-/// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg`
-/// empty; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
+/// Reads a cameras CSV: poses, or view-projection matrices.
+///
+/// Poses: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`, and any of `up_*`, `fovy_deg`,
+/// `aspect`, `near`, `far` (empty or `inf` = infinite), `ortho_height` (world units: the
+/// lens is orthographic, `fovy_deg` empty; empty: perspective). Matrices: `m00,m01,..,m33`
 /// (row, column) and nothing of the others. Times in `time_s` must ascend; an empty one is
 /// not known. Columns in any order; a note names those that are not read, but for labels
 /// such as `name`.

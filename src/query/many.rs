@@ -44,8 +44,9 @@ impl Located {
         &self.ids
     }
 
-    /// The ids of a point, in the order of
-    /// [`query`](crate::index::RegionIndex::query).
+    /// The ids of a point.
+    ///
+    /// In the order of [`query`](crate::index::RegionIndex::query).
     ///
     /// # Panics
     /// No such point was answered.

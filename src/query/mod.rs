@@ -10,16 +10,16 @@ mod recorder;
 mod sink;
 mod volume;
 
-pub use crate::geometry::{Planes, Sorted};
+pub use crate::geometry::Planes;
+pub(crate) use crate::geometry::Sorted;
 pub use context::{Context, QueryContext};
 pub(crate) use dispatched::Dispatched;
 pub use many::Located;
-pub(crate) use predicate::Bits;
-#[cfg(feature = "cli")]
-pub(crate) use predicate::plane_test;
+pub(crate) use predicate::{Bits, plane_test};
 pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
-pub use sink::{Count, Ranges, Sink, Tests, runs};
+pub(crate) use sink::runs;
+pub use sink::{Count, Ranges, Sink, Tests};
 pub(crate) use volume::each_volume;
 pub use volume::{AnyVolume, QueryVolume};
 

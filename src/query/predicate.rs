@@ -18,8 +18,10 @@ pub enum Containment {
     Inside,
 }
 
-/// Up to 32 planes with a test of their own: a camera's frustum in any form, or
-/// a box or a point, which have a single "plane" of another shape.
+/// Up to 32 planes with a test of their own.
+///
+/// A camera's frustum in any form, or a box or a point, which have a single "plane" of
+/// another shape.
 ///
 /// A parent passes a mask of open planes to its children: the planes that it does not
 /// lie wholly inside of. An implementation must be monotone, for each plane by itself:
@@ -164,7 +166,6 @@ macro_rules! plane_test {
         }
     };
 }
-#[cfg(feature = "cli")]
 pub(crate) use plane_test;
 
 impl Predicate for ConvexVolume {

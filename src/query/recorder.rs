@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Counts the steps of a query. The calls of [`NoRecorder`] compile to nothing,
-/// and nothing is ever timed with counters on.
+/// Counts the steps of a query.
+///
+/// The calls of [`NoRecorder`] compile to nothing, and nothing is ever timed with counters
+/// on.
 pub trait Recorder {
     /// The bounds of nodes were classified.
     #[inline(always)]
@@ -46,8 +48,9 @@ pub struct QueryCost {
 }
 
 impl QueryCost {
-    /// Bounds tested, of nodes and items together: the "compares" of the
-    /// lecture's O(n) against O(log n).
+    /// Bounds tested, of nodes and items together.
+    ///
+    /// The "compares" of the lecture's O(n) against O(log n).
     pub fn comparisons(&self) -> u64 {
         self.nodes_tested + self.items_tested
     }

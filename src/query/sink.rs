@@ -198,8 +198,9 @@ const TESTED_AHEAD: usize = 16 * LANES;
 /// Most blocks that are copied one by one; below, testing ahead would cost more.
 const FEW: usize = 48;
 
-/// Positions of the answers in the structure's own order; adjoining ranges are one.
-/// Only for structures that pass positions.
+/// Positions of the answers in the structure's own order.
+///
+/// Adjoining ranges are one. Only for structures that pass positions.
 #[derive(Debug)]
 pub struct Ranges<'a> {
     out: &'a mut Vec<Range<u32>>,

@@ -268,8 +268,10 @@ impl QueryVolume for Aabb {
     }
 }
 
-/// Any volume for an erased structure. Dispatched once per query, never per node.
-/// A box becomes one by [`ConvexVolume::of_box`].
+/// Any volume for an erased structure.
+///
+/// Dispatched once per query, never per node. A box becomes one by
+/// [`ConvexVolume::of_box`].
 #[derive(Clone, Copy, Debug)]
 pub enum AnyVolume<'a> {
     /// THE plane test in f32.

@@ -30,15 +30,17 @@ pub enum Basis {
     ///
     /// Per process, ln(time) of a structure minus the median of an odd number of the other
     /// structures that both reports have in the group, each about its mean in the old report;
-    /// old and new by [`judge_unpaired`]. What moved everything at once is [`Changes::common_shifts`].
+    /// old and new by a test of unpaired samples. What moved everything at once is
+    /// [`Changes::common_shifts`].
     Reports,
-    /// Pairs of processes in turns: times as they are, by [`judge`].
+    /// Pairs of processes in turns: times as they are, by a paired test.
     Pairs,
 }
 
-/// Compares cells with older ones by these metrics of
-/// [`JUDGED_METRICS`](super::JUDGED_METRICS) or of [`WORK`], with Holm's correction over
-/// the cells of a metric. `threshold` 0.05 is 5 %.
+/// Compares cells with older ones by some metrics.
+///
+/// The metrics are of [`JUDGED_METRICS`](super::JUDGED_METRICS) or are counters of work, with Holm's
+/// correction over the cells of a metric. `threshold` 0.05 is 5 %.
 pub fn changes(
     basis: Basis,
     [old, new]: [&[ReportCell]; 2],

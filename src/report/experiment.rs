@@ -13,8 +13,9 @@ use crate::measure::{
 use crate::path::{self, CameraPath};
 use crate::scene::Scene;
 
-/// A plan that the calling process measures alone. Times have no intervals:
-/// those need several processes.
+/// A plan that the calling process measures alone.
+///
+/// Times have no intervals: those need several processes.
 ///
 /// ```
 /// use cullbench::prelude::*;
@@ -52,9 +53,10 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// An experiment on a scene: a file, a sample or a spec, as [`scene::load`] takes
-    /// it. Frustum queries and region searches with warm caches, a tenth of a second per
-    /// structure and path.
+    /// An experiment on a scene: a file, a sample or a spec.
+    ///
+    /// [`scene::load`] takes it. Frustum queries and region searches with warm caches, a
+    /// tenth of a second per structure and path.
     ///
     /// [`scene::load`]: crate::scene::load
     pub fn new(scene: &str) -> Experiment {
@@ -111,8 +113,8 @@ impl Experiment {
     /// Loads, builds, checks every answer, and times.
     ///
     /// # Errors
-    /// The errors of [`measure_scene`]; a plan that measures nothing, or that one process
-    /// cannot measure.
+    /// A scene or a path that cannot be read or made, a camera without a view; a plan that
+    /// measures nothing, or that one process cannot measure.
     pub fn run(&self) -> Result<Report, ExperimentError> {
         self.check()?;
         let started_at = utc(SystemTime::now());

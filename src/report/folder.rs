@@ -152,8 +152,10 @@ pub struct StoppedRun {
 }
 
 impl StoppedRun {
-    /// Opens it, with what its stream holds. Half a line at its end is none, and
-    /// parts whose samples are gone are to be measured again.
+    /// Opens the folder of a stopped run, with what its stream holds.
+    ///
+    /// Half a line at its end is none, and parts whose samples are gone are to be measured
+    /// again.
     ///
     /// # Errors
     /// No stream, not a stream, another schema version, or another process at

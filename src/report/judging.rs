@@ -10,8 +10,9 @@ use serde::Serialize;
 use crate::measure::{CellKey, Status};
 use crate::statistics::{Change, Judgement};
 
-/// The metrics with a value per process, which a judgement needs; less is
-/// better. The first is the one that structures are ranked by.
+/// The metrics with a value per process, which a judgement needs; less is better.
+///
+/// The first is the one that structures are ranked by.
 pub static JUDGED_METRICS: &[&str] = &[
     "query_ns",
     "locate_ns",
@@ -21,8 +22,9 @@ pub static JUDGED_METRICS: &[&str] = &[
     "update_ns",
 ];
 
-/// Counters that do not depend on the machine or the moment: any difference is
-/// a change of the program.
+/// Counters that do not depend on the machine or the moment.
+///
+/// Any difference is a change of the program.
 pub static COUNTERS: &[&str] = &[
     "visible_count",
     "nodes_tested",
@@ -141,8 +143,10 @@ impl JudgedRow {
         judged.or(values.map(|(old, new)| new / old))
     }
 
-    /// Returns true if the row is worth reading: not the same as before, not a
-    /// metric that neither side ever had, not a failure as before.
+    /// Returns true if the row is worth reading.
+    ///
+    /// Not the same as before, not a metric that neither side ever had, not a failure as
+    /// before.
     pub fn is_news(&self) -> bool {
         match self.outcome {
             Outcome::Same => false,
@@ -260,8 +264,9 @@ impl Changes {
         outcomes.all(|o| matches!(o, Different | Unmeasured | FailedInBoth)) && !self.is_wrong()
     }
 
-    /// More processes or pairs that would decide all inconclusive cells, as far
-    /// as it is known: the most that one of them needs.
+    /// More processes or pairs that would decide all inconclusive cells.
+    ///
+    /// The most that one of them needs, if it is known.
     pub fn more_pairs(&self) -> Option<usize> {
         let judged = self.rows.iter().filter_map(|row| row.judgement);
         judged.filter_map(|found| found.more_pairs).max()

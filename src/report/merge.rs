@@ -24,8 +24,10 @@ pub struct Merged {
     samples: Vec<(PathBuf, [u64; 2])>,
 }
 
-/// Joins the folders of shards. `line` has the options that the shards have in
-/// common, and the command that they make; what they are is the caller's to compare.
+/// Joins the folders of shards.
+///
+/// `line` has the options that the shards have in common, and the command that they make;
+/// the caller compares them.
 ///
 /// # Errors
 /// No shard or an unfinished one; another seed, suite, structure, machine, build or

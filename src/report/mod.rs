@@ -16,17 +16,21 @@ mod surface;
 mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef, TwinEntry};
-pub use changes::{Basis, FEW_OTHERS, Setting, changes, settings};
+pub use crate::statistics::{Change, Estimate, Judgement, Trimmed};
+pub(crate) use changes::FEW_OTHERS;
+pub use changes::{Basis, Setting, changes, settings};
 pub use experiment::Experiment;
-pub use folder::{RunFolder, StoppedRun, save_page, save_report};
-pub use judging::{
-    COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WORK, WorkChange,
-};
+pub(crate) use folder::save_page;
+pub use folder::{RunFolder, StoppedRun, save_report};
+pub(crate) use judging::WORK;
+pub use judging::{Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange};
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION};
-pub use ranking::{Comparison, Mean, Overall, comparisons, times_as_fast};
-pub use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
+pub use ranking::{Comparison, comparisons};
+pub(crate) use ranking::{Mean, Overall, times_as_fast};
+pub(crate) use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, read_report, read_stream, views};
-pub use stream::{Header, KeptPart, Line, Stream, dated, digits, utc};
+pub use stream::{Header, KeptPart, Line, Stream};
+pub(crate) use stream::{dated, digits, utc};
 pub use surface::{Crossing, Growth, Place, Surface, growths, surfaces};
-pub use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};
+pub(crate) use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};

@@ -29,8 +29,9 @@ pub struct Report {
     pub noise: Noise,
     /// Structures, by scene, path and test.
     pub cells: Vec<ReportCell>,
-    /// Lower bounds, measured in the same rounds as the cells of their scene and
-    /// path: no structures, never ranked, and therefore a list of their own.
+    /// Lower bounds, measured in the same rounds as the cells of their scene and path.
+    ///
+    /// No structures, never ranked, and therefore a list of their own.
     #[serde(default)]
     pub bounds: Vec<ReportCell>,
 }
@@ -42,8 +43,9 @@ impl Report {
         cells.flat_map(|cell| &cell.path.warnings).collect()
     }
 
-    /// Returns true if an answer is wrong, or if structures were tried and none has
-    /// answered (exit code 1).
+    /// Returns true if an answer is wrong, or if no structure has answered.
+    ///
+    /// Exit code 1; without structures, none has to answer.
     pub fn has_failed(&self) -> bool {
         let any = |is: fn(Status) -> bool| self.cells.iter().any(|cell| is(cell.status));
         let tried = any(|status| status != Status::LeftOut);
@@ -95,8 +97,9 @@ fn one() -> u32 {
 pub struct Noise {
     /// Geometric mean of all twin ratios: 1 unless the order is unfair.
     pub aa_ratio: Option<f64>,
-    /// The twin ratio of each scene and path: a check that its interval holds 1.
-    /// Nothing is derived from it.
+    /// The twin ratio of each scene and path.
+    ///
+    /// A check that its interval holds 1. Nothing is derived from it.
     pub twins: Vec<TwinEntry>,
     /// Causes of noisy times, as far as the run noticed them, with advice.
     #[serde(default)]

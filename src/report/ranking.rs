@@ -74,8 +74,9 @@ impl<'r> Comparison<'r> {
         self.sound().find(|cell| cell.structure == structure)
     }
 
-    /// The speed-up of a cell over the structure `base` of the same comparison, process
-    /// by process; the base itself has no interval.
+    /// The speed-up of a cell over the structure `base` of the same comparison.
+    ///
+    /// Process by process; the base itself has no interval.
     pub fn speedup(&self, base: &str, cell: &ReportCell) -> Option<Estimate> {
         if base == YARDSTICK {
             return cell.metrics.get("speedup").map(Metric::estimate);
@@ -89,8 +90,7 @@ impl<'r> Comparison<'r> {
         Some(found.map_or(exact, |found| Estimate { value, ..found }))
     }
 
-    /// The fastest structure that is not this crate's own and whose answers are
-    /// right.
+    /// The fastest structure of another crate whose answers are right.
     pub fn fastest_peer(&self) -> Option<&'r ReportCell> {
         let mut sound = self.sound();
         sound.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
@@ -118,8 +118,9 @@ impl<'r> Comparison<'r> {
     }
 }
 
-/// Time of `base` / time of `cell`, the ratio of the two shown values: how many
-/// times as fast the cell is.
+/// Time of `base` / time of `cell`: how many times as fast the cell is.
+///
+/// The ratio of the two shown values.
 pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
     Some(base.time()?.value / cell.time()?.value)
 }
@@ -184,8 +185,9 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     items.or(count).or(cameras)
 }
 
-/// Why the times are not of the same work, if they are not: the mean over other
-/// cameras, or of shorter batches, is another figure.
+/// The reason why two times are not of the same work; `None` if they are.
+///
+/// The mean over other cameras, or of shorter batches, is another figure.
 pub fn timed_otherwise((old, new): Pair) -> Option<String> {
     let (was, is) = (&old.times, &new.times);
     if was.cameras_timed != is.cameras_timed {
@@ -202,8 +204,9 @@ pub fn timed_otherwise((old, new): Pair) -> Option<String> {
 
 /// The structures of several comparisons.
 pub struct Overall<'r> {
-    /// Structure that speed-ups refer to: `linear`; where it has no times, the slowest
-    /// of those that have times everywhere.
+    /// Structure that speed-ups refer to.
+    ///
+    /// `linear`; where it has no times, the slowest of those that have times everywhere.
     pub base: Option<&'r str>,
     /// Those with times everywhere, fastest first; the others behind them.
     pub standings: Vec<Mean<'r>>,
@@ -222,8 +225,9 @@ pub struct Mean<'r> {
 }
 
 impl Mean<'_> {
-    /// True if no paired test over the processes tells the means apart; without a test,
-    /// if they are less than 1.5 % apart.
+    /// True if no paired test over the processes tells the means apart.
+    ///
+    /// Without a test, if they are less than 1.5 % apart.
     pub fn ties_with(&self, other: &Mean) -> bool {
         let (own, other) = (&self.logs, &other.logs);
         let apart = own.iter().sum::<f64>() - other.iter().sum::<f64>();

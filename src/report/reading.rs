@@ -20,7 +20,8 @@ use crate::shown::{lines, plain};
 use crate::statistics::median;
 
 /// Reads a report from its file, or from the folder of a run, finished or not.
-/// Fields that it does not know are ignored.
+///
+/// Unknown fields are ignored.
 ///
 /// # Errors
 /// I/O errors, a file that is not a report, or another schema version.
@@ -61,8 +62,10 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
     Ok(report)
 }
 
-/// Reads the stream of a run, and the ends of its lines in bytes: of the header,
-/// of each part, and last of the whole without half a line at its end.
+/// Reads the stream of a run, and the ends of its lines in bytes.
+///
+/// The ends of the header, of each part, and last of the whole without half a line at its
+/// end.
 ///
 /// # Errors
 /// Errors of the file system; a line that is none or does not belong there (by its

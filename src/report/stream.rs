@@ -211,8 +211,7 @@ impl Stream {
         parts
     }
 
-    /// The report of what is there: every group that the first process has
-    /// finished.
+    /// The report of every group that the first process has finished.
     pub fn report(&self) -> Report {
         let header = &self.header;
         let mut run = header.run.clone();
@@ -270,8 +269,10 @@ pub fn digits(clock: SystemTime) -> String {
     format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF)
 }
 
-/// RFC 3339 in UTC, to the second. A clock out of range gives the nearest time
-/// that a report can be dated with: it is no reason not to measure.
+/// RFC 3339 in UTC, to the second.
+///
+/// A clock out of range gives the nearest time that a report can be dated with: it is no
+/// reason not to measure.
 pub fn utc(clock: SystemTime) -> String {
     humantime::format_rfc3339_seconds(dated(clock)).to_string()
 }

@@ -28,8 +28,9 @@ pub struct Place<'r> {
     pub items: usize,
     /// Visible items / items, as measured.
     pub share: f64,
-    /// The same to the nearest of 1, 1.5, 2, 3, 5, 7, 10, ... percent and parts
-    /// of it: never further than a factor of 1.3.
+    /// The share to the nearest of 1, 1.5, 2, 3, 5, 7, 10, ... percent and parts of it.
+    ///
+    /// Never further than a factor of 1.3.
     pub class: f64,
     /// The cells there, and how they rank.
     pub comparison: Comparison<'r>,
@@ -70,8 +71,9 @@ fn class_of(share: f64) -> f64 {
     nearest.unwrap_or(share).min(1.0)
 }
 
-/// The surfaces of all comparisons that ranked anything, in the order in which
-/// they were measured.
+/// The surfaces of all comparisons that ranked anything.
+///
+/// In the order in which they were measured.
 pub fn surfaces<'r>(comparisons: Vec<Comparison<'r>>) -> Vec<Surface<'r>> {
     let places = comparisons.into_iter().filter_map(|comparison| {
         let about = comparison.about();
@@ -137,9 +139,11 @@ impl Surface<'_> {
         unique(cells.map(|cell| cell.structure.as_str()))
     }
 
-    /// Number of items from which a structure is faster than the linear scan for good;
+    /// Number of items from which a structure is faster than the linear scan for good.
+    ///
     /// `None` if it is known at one size only. It is faster where that is shown
-    /// ([`Estimate::exceeds`]); in between, the logarithms of the speed-ups are interpolated.
+    /// ([`Estimate::exceeds`]); in between, the logarithms of the speed-ups are
+    /// interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
         let places = self.places.iter().filter(|place| place.class == class);
         let points = places.filter_map(|p| Some((p.items, p.cell(structure)?.value("speedup")?)));
@@ -199,8 +203,9 @@ const SAME_COUNT: f64 = 1.3;
 /// Fewer sizes have no interval.
 const LEAST_SIZES: usize = 3;
 
-/// All structures that were measured on at least three sizes of a world with
-/// (about) the same number of visible items by the same kind of path.
+/// All structures that were measured on at least three sizes of a world.
+///
+/// With (about) the same number of visible items, by the same kind of path.
 pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     let ok = report.cells.iter().enumerate();
     let ok = ok.filter(|(_, c)| c.status == Status::Ok && c.path.motion.is_empty());

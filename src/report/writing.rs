@@ -18,9 +18,10 @@ use crate::json::JsonError;
 /// Beginning and end of temporary names.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 
-/// Writes a file whole or not at all. A link stays one, and its target is
-/// replaced; an existing file keeps its permissions. A terminal, a pipe or a device
-/// is written to and never replaced.
+/// Writes a file whole or not at all.
+///
+/// A link stays one, and its target is replaced; an existing file keeps its permissions. A
+/// terminal, a pipe or a device is written to and never replaced.
 ///
 /// # Errors
 /// I/O errors, with the path.
@@ -84,8 +85,9 @@ pub fn folder_of(file: &Path) -> &Path {
     }
 }
 
-/// Tries to write into the folder of a future file, and leaves nothing there:
-/// a folder that is read-only or full is found before the work.
+/// Tries to write into the folder of a future file, and leaves nothing there.
+///
+/// A folder that is read-only or full is found before the work.
 ///
 /// # Errors
 /// I/O errors, with the path.

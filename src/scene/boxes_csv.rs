@@ -14,8 +14,10 @@ use crate::shown::shortened;
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
-/// Reads a scene from boxes CSV; numbers are f64 and are rounded outward to
-/// f32 about an origin chosen in f64. `file` only names the source in errors.
+/// Reads a scene from boxes CSV.
+///
+/// Numbers are f64 and are rounded outward to f32 about an origin chosen in f64. `file`
+/// only names the source in errors.
 ///
 /// With `skip_bad_items`, rows that are not a finite box with min <= max are
 /// left out and counted in [`Scene::skipped_items`]; the others keep the ids of
@@ -150,9 +152,10 @@ fn read_rows(table: &mut TableReader, limit: f64) -> Result<Rows> {
     Ok(rows)
 }
 
-/// Writes a scene's boxes as they were written, in world coordinates, with its
-/// labels as further columns. Numbers are written so that reading them back gives
-/// the same f64; [`Scene::settled`] makes a scene what is then read.
+/// Writes a scene's boxes as they were written, in world coordinates.
+///
+/// Its labels are further columns. Reading the numbers back gives the same f64;
+/// [`Scene::settled`] makes a scene what is then read.
 pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(output);
     for bound in BOUNDS {

@@ -51,8 +51,9 @@ pub fn descend(mut at: BspChild, below: impl Fn(u32) -> BspChild) -> Option<Item
 /// Real maps have 13 to 61. A chain of planes would make building quadratic.
 const DEPTH: usize = 256;
 
-/// The planes of a map's nodes, for structures that can use them: a tree as the
-/// readers of maps have checked, down to [`DEPTH`].
+/// The planes of a map's nodes, for structures that can use them.
+///
+/// A tree as the readers of maps have checked, down to [`DEPTH`].
 pub fn plane_tree(
     root: BspChild,
     nodes: impl Iterator<Item = (Plane, [BspChild; 2])>,
@@ -132,8 +133,9 @@ pub struct BspTree {
 }
 
 impl BspTree {
-    /// Bounds the leaves of a tree within the closed square
-    /// `[low, high]^2`, outside of which no point has a leaf. O(nodes * depth).
+    /// Bounds the leaves of a tree within the closed square `[low, high]^2`.
+    ///
+    /// No point outside of it has a leaf. O(nodes * depth).
     ///
     /// # Errors
     /// A node or leaf that is reached twice or does not exist: the nodes form no tree.
@@ -176,6 +178,7 @@ impl BspTree {
     }
 
     /// The partition lines as upright planes, for structures that can use them.
+    ///
     /// Ties do not matter to those: they keep their own bounds.
     pub fn plane_tree(&self) -> PlaneTree {
         let nodes = self.nodes.iter().map(|node| {
@@ -187,8 +190,9 @@ impl BspTree {
         plane_tree(self.root, nodes)
     }
 
-    /// The leaf that holds the point, by descent from the root; `None` outside the
-    /// closed square. O(depth).
+    /// The leaf that holds the point, by descent from the root.
+    ///
+    /// `None` outside the closed square. O(depth).
     pub fn descend(&self, p: DVec2) -> Option<ItemId> {
         let [low, high] = self.extent.map(DVec2::splat);
         let is_within = p.cmpge(low).all() && p.cmple(high).all();

@@ -34,8 +34,9 @@ fn scattered(n: usize, rng: &mut SeededRng, block: DVec3, size: f64) -> Vec<Worl
     boxes.collect()
 }
 
-/// Gaussian clusters of uneven weight: dense spots in mostly empty space, as in
-/// asset-heavy levels or point-like survey data.
+/// Gaussian clusters of uneven weight.
+///
+/// Dense spots in mostly empty space, as in asset-heavy levels or point-like survey data.
 ///
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few clusters hold
 /// most of the scene.

@@ -10,9 +10,10 @@ use super::{Regions, Scene, Surfaces, families, rooms};
 use crate::input::Result;
 use crate::spec::{Spec, SpecError};
 
-/// The generator behind every seeded choice. Its stream is fixed by its
-/// definition (O'Neill 2014, PCG XSL RR 128/64), so the same seed gives the
-/// same scene on every machine.
+/// The random generator behind every seeded choice.
+///
+/// Its stream is fixed by its definition (O'Neill 2014, PCG XSL RR 128/64), so the same
+/// seed gives the same scene on every machine.
 pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
@@ -22,15 +23,15 @@ pub struct Family {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
-    /// Parameters beyond [`SCENE_PARAMS`], for the help.
+    /// Parameters beyond those of all scenes, for the help.
     pub params: &'static str,
     /// The generator.
-    pub build: Build,
+    pub(super) build: Build,
 }
 
 /// A generator: the same world for the same arguments on every machine.
 #[derive(Clone, Copy)]
-pub enum Build {
+pub(super) enum Build {
     /// Makes `n` boxes from parameters and a random stream.
     Boxes(fn(&mut Spec, usize, &mut SeededRng) -> families::Made),
     /// Makes `n` boxes, and the rooms that they enclose.
@@ -98,7 +99,7 @@ impl Family {
     ///
     /// # Errors
     /// A parameter that is unknown or out of range.
-    pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene> {
+    pub(super) fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene> {
         let least = u64::from(matches!(self.build, Mesh(_)));
         let n = spec.whole("n", COUNT, least..=MOST)?;
         let seed = spec.whole("seed", 1, 0..=u64::MAX)?;

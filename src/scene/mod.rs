@@ -38,37 +38,38 @@ use glam::{DVec3, Vec3};
 use crate::arithmetic::two_sum;
 
 use crate::geometry::{Aabb, PlaneTree};
-use crate::input::{InputError, Result};
+use crate::input::Result;
 use crate::query::ItemId;
 
+pub use crate::input::InputError;
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
-#[cfg(feature = "cli")]
 pub(crate) use bsp::clipped;
 pub use disputes::{Dispute, Linedef};
 pub(crate) use families::CityGrid;
-pub(crate) use generate::COUNT;
-pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
+pub(crate) use generate::{COUNT, GENERATOR_NAME, SCENE_PARAMS};
+pub use generate::{FAMILIES, Family, MESHES};
 pub use gltf::CameraAnimation;
 pub use ibsp::{LeafNode, LeafTree, QuakeMap, read_ibsp};
 pub use labels::Labels;
-#[cfg(feature = "cli")]
 pub(crate) use memory::available_bytes;
-#[cfg(feature = "cli")]
 pub(crate) use meshes::ground::Shape;
 pub use obj::read_obj;
 pub use options::{CameraPlace, ITEM_KINDS, ItemKind, LoadOptions, PlaceView, UP_AXES, UpAxis};
 pub use rng::SeededRng;
 pub(crate) use rng::{mix64, on_sphere};
 pub use rooms::{Portal, Tiling};
-pub use samples::{FETCHED, FETCHED_FOLDER, Fetched, NOTICE, SAMPLES, Sample};
-pub use source::{check_fits, every_part, is_wad, load, part_names, read_bytes, split_part};
-pub use surface::{ItemShape, SurfaceKind, Surfaces, volume_within};
+pub(crate) use samples::{FETCHED, FETCHED_FOLDER, Fetched};
+pub use samples::{NOTICE, SAMPLES, Sample};
+pub(crate) use source::{check_fits, every_part, split_part};
+pub use source::{load, part_names, read_bytes};
+pub(crate) use surface::volume_within;
+pub use surface::{ItemShape, SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_names};
 pub use written::{Originals, Sought, SoughtBox};
 #[cfg(test)]
-pub use zip::tests::packed;
+pub(crate) use zip::tests::packed;
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -145,15 +146,18 @@ impl WorldBox {
 /// The regions of a scene, numbered from zero: the targets of region search.
 #[derive(Clone, Default, Debug)]
 pub enum Regions {
-    /// The items themselves, closed boxes that may overlap: a point belongs
-    /// to every one that holds it.
+    /// The items themselves: closed boxes that may overlap.
+    ///
+    /// A point belongs to every one that holds it.
     #[default]
     Items,
-    /// Boxes that tile a volume, joined by portals. Closed as well: a point
-    /// on a shared wall belongs to both sides.
+    /// Boxes that tile a volume, joined by portals.
+    ///
+    /// Closed as well: a point on a shared wall belongs to both sides.
     Tiling(Tiling),
-    /// The leaves of a map's own 2-D BSP tree: every point of the map belongs
-    /// to exactly one, whatever its height.
+    /// The leaves of a map's own 2-D BSP tree.
+    ///
+    /// Every point of the map belongs to exactly one, whatever its height.
     Bsp(Arc<WadMap>),
     /// The open leaves of a map's own BSP tree.
     ///
@@ -162,8 +166,9 @@ pub enum Regions {
 }
 
 impl Regions {
-    /// The boxes to build an index over. Every point of region i lies in
-    /// box i.
+    /// The boxes to build an index over.
+    ///
+    /// Every point of region i lies in box i.
     pub fn boxes<'a>(&'a self, items: &'a [Aabb]) -> &'a [Aabb] {
         match self {
             Regions::Items => items,
@@ -173,8 +178,9 @@ impl Regions {
         }
     }
 
-    /// The boxes that hold a local point, found by testing each: the answer an
-    /// index must give. Ascending ids.
+    /// The boxes that hold a local point, found by testing each.
+    ///
+    /// The answer an index must give. Ascending ids.
     pub fn holding(&self, p: Vec3, items: &[Aabb]) -> Vec<ItemId> {
         let boxes = self.boxes(items).iter().zip(0..);
         let holding = boxes.filter(|(b, _)| b.contains_point(p));
@@ -293,8 +299,9 @@ impl Scene {
         })
     }
 
-    /// The bounds of all items in world coordinates; a unit box about the
-    /// origin for a scene without items.
+    /// The bounds of all items in world coordinates.
+    ///
+    /// A unit box about the origin for a scene without items.
     pub fn world_bounds(&self) -> WorldBox {
         if self.bounds.is_empty() {
             return WorldBox::around(self.origin, DVec3::ONE);
@@ -303,10 +310,11 @@ impl Scene {
         WorldBox::new(self.origin + min, self.origin + max)
     }
 
-    /// SHA-256 over origin and item bounds, and over the boxes as they were
-    /// written where f32 holds them otherwise: two scenes with the same digest
-    /// ask the same questions of every structure, and the answers are judged by
-    /// the same truth. O(n).
+    /// SHA-256 over the origin and the bounds of the items.
+    ///
+    /// Also over the boxes as they were written where f32 holds them otherwise: two scenes
+    /// with the same digest ask the same questions of every structure, and the answers are
+    /// judged by the same truth. O(n).
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
         let le_bytes = |corner: DVec3| corner.to_array().map(f64::to_le_bytes).concat();

@@ -44,8 +44,9 @@ impl SeededRng {
         DVec3::new(self.unit(), self.unit(), self.unit())
     }
 
-    /// Standard normal (Box and Muller 1958), through `libm` so that every
-    /// platform rounds alike.
+    /// Standard normal number (Box and Muller 1958).
+    ///
+    /// Through `libm`, so that every platform rounds alike.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
         radius * libm::cos(std::f64::consts::TAU * self.unit())
@@ -83,8 +84,9 @@ fn noise(p: DVec3, corner: impl Fn(IVec3) -> f64) -> f64 {
     mix(sheet(0), sheet(4), smooth.z)
 }
 
-/// Octaves of noise in `[0, 1)`, from the values in `[0, 1)` that `hash` has for an
-/// octave and a lattice point.
+/// Octaves of noise in `[0, 1)`.
+///
+/// `hash` returns a value in `[0, 1)` for an octave and a lattice point.
 pub fn octaves(p: DVec3, octaves: u64, hash: impl Fn(u64, IVec3) -> f64) -> f64 {
     let (mut at, mut amplitude, mut sum) = (p, 0.5, 0.0);
     for octave in 0..octaves {

@@ -27,8 +27,9 @@ pub struct Sample {
     pub bytes: &'static [u8],
 }
 
-/// Whose works the samples are and under which terms: a program that contains
-/// them has to be able to show it (`cullbench licences`).
+/// Authors and licences of the samples.
+///
+/// A program that contains the samples must be able to show it (`cullbench licences`).
 pub const NOTICE: &str = concat!(
     include_str!("../../datasets/NOTICE.txt"),
     include_str!("../../datasets/freedm_LICENSE.txt")

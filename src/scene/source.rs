@@ -73,8 +73,10 @@ pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Loads `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`,
-/// `map.wad`, `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file wins over a name.
+/// Loads a scene: a sample, a spec or a file.
+///
+/// `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`, `map.wad`,
+/// `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file wins over a name.
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
@@ -137,8 +139,9 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
     Err(error.into())
 }
 
-/// Refuses a scene whose name says that it will not fit into memory; nothing is
-/// loaded.
+/// Refuses a scene whose name says that it will not fit into memory.
+///
+/// Nothing is loaded.
 ///
 /// # Errors
 /// A scene that would not fit.

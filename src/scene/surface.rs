@@ -17,18 +17,23 @@ named! {
     /// Effect of a surface on a ray.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
     pub enum SurfaceKind {
-        /// It ends there.
+        /// A ray ends there.
         Opaque = "opaque",
-        /// It ends there or passes, as a mask of holes says: leaves, fences. Such a
-        /// surface is counted on to hide nothing.
+        /// A ray ends there or passes, as a mask of holes says: leaves, fences.
+        ///
+        /// Such a surface is counted on to hide nothing.
         CutOut = "cut-out",
-        /// It passes, changed: glass, water. Hides nothing.
+        /// A ray passes, changed: glass, water.
+        ///
+        /// Such a surface hides nothing.
         Clear = "clear",
     }
 }
 
-/// Triangles, item by item. Coordinates are f32 about an f64 origin; corners are
-/// counter-clockwise as seen from the outside.
+/// Triangles, item by item.
+///
+/// Coordinates are f32 about an f64 origin; corners are counter-clockwise as seen from the
+/// outside.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
     /// Zero of `points`, in the world.
@@ -233,8 +238,10 @@ impl Surfaces {
         WorldBox::union_of(corners.flatten().map(corner))
     }
 
-    /// The scene of these triangles: its items are the smallest f32 boxes that hold
-    /// those of each item, as they were written.
+    /// The scene of these triangles.
+    ///
+    /// Its items are the smallest f32 boxes that hold those of each item, as they were
+    /// written.
     ///
     /// # Errors
     /// An item without triangles, which has no box.

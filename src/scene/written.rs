@@ -70,14 +70,16 @@ pub struct Sought {
 pub struct SoughtBox {
     /// World coordinates, in f64.
     pub world: WorldBox,
-    /// The planes of the smallest f32 box that holds it. They admit too many items
-    /// rather than too few.
+    /// The planes of the smallest f32 box that holds it.
+    ///
+    /// They admit too many items rather than too few.
     pub volume: ConvexVolume,
 }
 
 impl Scene {
-    /// A point of the world as this scene's indexes take it. A planar BSP ignores the
-    /// height.
+    /// A point of the world as this scene's indexes take it.
+    ///
+    /// A planar BSP ignores the height.
     #[inline]
     pub fn sought(&self, world: DVec3) -> Sought {
         let mut local = (world - self.origin).as_vec3();
@@ -94,8 +96,9 @@ impl Scene {
         SoughtBox { world, volume }
     }
 
-    /// Region search: `ask` appends the candidates of an index; those that hold the
-    /// point exactly are kept.
+    /// Region search: the regions that hold the point exactly.
+    ///
+    /// `ask` appends the candidates of an index; the others of them are dropped.
     #[inline]
     pub fn search(
         &self,
@@ -116,8 +119,9 @@ impl Scene {
             || (0..3).any(is_rounded)
     }
 
-    /// Keeps, of the candidates from `first` on, the regions that hold the point
-    /// exactly.
+    /// Keeps the regions that hold the point exactly.
+    ///
+    /// Drops the others of the candidates from `first` on.
     #[inline]
     pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
         if found.len() > first && self.is_refined(p) {
@@ -132,14 +136,16 @@ impl Scene {
         }
     }
 
-    /// Keeps the items, of an index's candidates, that overlap the box exactly: closed
-    /// boxes that have a point in common.
+    /// Keeps the items that overlap the box exactly, of an index's candidates.
+    ///
+    /// Closed boxes that have a point in common.
     pub fn refine_overlapping(&self, sought: &SoughtBox, found: &mut Vec<ItemId>) {
         found.retain(|&id| self.overlaps(id, &sought.world));
     }
 
-    /// Reference answer of region search: the map's own descent, or an exact test of
-    /// every box. Ascending ids.
+    /// Reference answer of region search.
+    ///
+    /// The map's own descent, or an exact test of every box. Ascending ids.
     pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
         if let Some(leaf) = self.regions.leaf_at(p.world - self.origin) {
             return leaf.into_iter().collect();
@@ -180,8 +186,9 @@ impl Scene {
         }
     }
 
-    /// The items as they were written, world coordinates. Exact: where no
-    /// original is kept, origin and stored box add up without rounding.
+    /// The items as they were written, world coordinates.
+    ///
+    /// Exact: where no original is kept, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
         let originals = self.originals.boxes();
         let items = self.items.iter().enumerate();
@@ -191,8 +198,10 @@ impl Scene {
         })
     }
 
-    /// The scene as it is read back from a boxes file: the same boxes, as they
-    /// were written, and labels; no triangles, regions, camera places or own tree.
+    /// The scene as it is read back from a boxes file.
+    ///
+    /// The same boxes, as they were written, and labels; no triangles, regions, camera
+    /// places or own tree.
     ///
     /// Almost always the stored items are the very same too. Where the reader
     /// chooses another origin (a map whose zero lies far away), they are rounded

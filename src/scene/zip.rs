@@ -149,8 +149,9 @@ fn ends_in(name: &str, endings: &[&str]) -> bool {
     !is_aside && endings.iter().any(|ending| name.ends_with(ending))
 }
 
-/// The entry of a name, or the only scene; the map in it, if one is named, as in
-/// `maps.wad#MAP07`.
+/// The entry of a name, or the only scene.
+///
+/// Also the map in it, if one is named, as in `maps.wad#MAP07`.
 ///
 /// # Errors
 /// No such entry, or several.

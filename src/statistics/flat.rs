@@ -10,7 +10,6 @@ use super::Estimate;
 
 macro_rules! fields {
     ($($name:ident)*) => {$(
-        #[expect(missing_docs, reason = "the name of the field")]
         pub fn $name<S: Serializer>(found: &Option<Estimate>, out: S) -> Result<S::Ok, S::Error> {
             let mut fields = out.serialize_struct(stringify!($name), 3)?;
             fields.serialize_field(stringify!($name), &found.map(|found| found.value))?;

@@ -66,8 +66,9 @@ pub struct Judgement {
     pub change: Change,
     /// New time / old time: above 1 is slower.
     pub ratio: f64,
-    /// 95 % interval of the ratio, which it always holds; `None` below three
-    /// pairs.
+    /// Lower end of the 95 % interval of the ratio.
+    ///
+    /// The interval always holds the ratio; `None` below three pairs.
     pub lower: Option<f64>,
     /// Upper end of the interval.
     pub upper: Option<f64>,
@@ -90,9 +91,10 @@ impl Judgement {
     }
 }
 
-/// Judges the cells of a comparison of two binaries. Per cell: ln(new / old) of
-/// each pair of processes; `threshold` 0.05 is 5 %. `None` for a cell with under
-/// three pairs, or with a value that is not finite.
+/// Judges the cells of a comparison of two binaries.
+///
+/// Per cell: ln(new / old) of each pair of processes; `threshold` 0.05 is 5 %. `None` for a
+/// cell with under three pairs, or with a value that is not finite.
 ///
 /// The estimate of a cell is the 20 % trimmed mean of its differences, its
 /// standard error is moderated over the cells. In this order a cell is
@@ -116,9 +118,10 @@ pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>>
     })
 }
 
-/// Returns true if every judged cell is known finely enough: the rule by which a
-/// comparison stops. On precision, never on significance: stopping at the first
-/// significant difference would find one where there is none.
+/// Returns true if every judged cell is known finely enough.
+///
+/// The rule by which a comparison stops. On precision, never on significance: stopping at
+/// the first significant difference would find one where there is none.
 pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {
     let mut resolutions = judged.iter().map(|j| j.as_ref().and_then(|j| j.resolution));
     resolutions.all(|found| found.is_some_and(|resolution| resolution <= threshold))

@@ -11,8 +11,10 @@ pub(super) fn squares(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-/// exp of the mean logarithm; `None` for no data or a value that is not
-/// positive. The right mean for ratios (Fleming and Wallace 1986).
+/// exp of the mean logarithm.
+///
+/// `None` for no data or a value that is not positive. The right mean for ratios (Fleming
+/// and Wallace 1986).
 pub fn geometric_mean(values: &[f64]) -> Option<f64> {
     if values.is_empty() || values.iter().any(|v| v.is_nan() || *v <= 0.0) {
         return None;
@@ -27,13 +29,6 @@ pub fn geometric_mean(values: &[f64]) -> Option<f64> {
 /// inside, so that the mean is continuous in the number of values (Tukey's
 /// midmean: Rosenberger and Gasko 1983, in Hoaglin, Mosteller and Tukey,
 /// "Understanding Robust and Exploratory Data Analysis", ch. 10, sec. C).
-///
-/// ```
-/// use cullbench::statistics::interquartile_mean;
-/// // Of five values the middle three, the outer two of them by 3/4.
-/// let found = interquartile_mean(&[9.0, 1.0, 2.0, 3.0, 5.0]).unwrap();
-/// assert!((found - (0.75 * 2.0 + 3.0 + 0.75 * 5.0) / 2.5).abs() < 1e-12);
-/// ```
 pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     if values.is_empty() || values.iter().any(|value| value.is_nan()) {
         return None;
@@ -49,8 +44,10 @@ pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     Some((sum / (count / 2.0)).clamp(sorted[first], sorted[end - 1]))
 }
 
-/// Quantile `q` in `[0, 1]` by linear interpolation between order statistics
-/// (Hyndman and Fan 1996, type 7: what R and NumPy do). `None` for no data.
+/// Quantile `q` in `[0, 1]`.
+///
+/// Linear interpolation between order statistics (Hyndman and Fan 1996, type 7: what R
+/// and NumPy do). `None` for no data.
 pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let at = q.clamp(0.0, 1.0) * last as f64;
@@ -79,9 +76,10 @@ const LEAST_SHARE: f64 = 0.2;
 /// Least distance of the centres, in standard deviations within the clusters.
 const SEPARATION: f64 = 5.0;
 
-/// The centres (geometric means) of the two clusters that times of one and the
-/// same work fall into, the fast one first; `None` if there is but one cluster,
-/// below forty values, or for a value that is not positive.
+/// The centres of the two clusters of times of one and the same work.
+///
+/// Geometric means, the fast one first; `None` if there is but one cluster, below forty
+/// values, or for a value that is not positive.
 ///
 /// The logarithms are split where the variance within both parts is smallest
 /// (Otsu 1979, "A threshold selection method from gray-level histograms"), each
@@ -111,6 +109,13 @@ fn within((low, high): (&[f64], &[f64])) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_interquartile_mean_weighs_the_values_at_its_ends() {
+        // Of five values the middle three, the outer two of them by 3/4.
+        let found = interquartile_mean(&[9.0, 1.0, 2.0, 3.0, 5.0]).unwrap();
+        assert!((found - (0.75 * 2.0 + 3.0 + 0.75 * 5.0) / 2.5).abs() < 1e-12);
+    }
 
     #[test]
     fn geometric_means_refuse_what_has_none() {

@@ -105,8 +105,9 @@ pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     Some(Estimate::within((-mean).exp(), ends))
 }
 
-/// Time of `own` / time of `other`: the ratio of the two values of [`one_run`].
-/// Beside the same `reference`; `None` as there.
+/// Time of `own` / time of `other`.
+///
+/// The ratio of the two values of [`one_run`] beside the same `reference`; `None` as there.
 pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> {
     let value = one_run(reference, own)?.value / one_run(reference, other)?.value;
     let margin = margin(&differences(own, other)?);

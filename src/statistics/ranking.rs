@@ -6,9 +6,10 @@ use super::trimmed::centre;
 /// Level at which two are told apart.
 pub const ALPHA: f64 = 0.05;
 
-/// Ranks structures by their trimmed means, 1 for the smallest. Two that share rank
-/// 1 are followed by rank 3. Per structure: one value per process, all from the same
-/// processes, paired by index.
+/// Ranks structures by their trimmed means, 1 for the smallest.
+///
+/// Two that share rank 1 are followed by rank 3. Per structure: one value per process, all
+/// from the same processes, paired by index.
 ///
 /// A structure shares the first rank from whose fastest a paired test over the processes,
 /// that of the intervals shown, does not tell it apart (two-sided, `alpha`). Under three
@@ -37,9 +38,9 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
     ranks
 }
 
-/// Returns true if a paired test over the processes finds `a` less than `b`
-/// (two-sided, `alpha`); under three processes, if its trimmed mean is
-/// less.
+/// Returns true if a paired test over the processes finds `a` less than `b`.
+///
+/// Two-sided at `alpha`; under three processes, if its trimmed mean is less.
 pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     let means = centre(a).zip(centre(b));
     means.is_some_and(|(a, b)| a < b) && told_apart(a, b, alpha)
@@ -53,15 +54,18 @@ fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
 /// How a point stands to the front.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Standing {
-    /// A point of the front that is no worse in anything and better in something,
-    /// where the samples show that the point is dominated; `None` on the front.
+    /// A point of the front that dominates this one; `None` on the front.
+    ///
+    /// No worse in anything and better in something, as the samples show.
     pub dominated_by: Option<usize>,
     /// Dominated by the values, which the samples do not show: it shares the front.
     pub is_tie: bool,
 }
 
-/// Dominance among points by their values, as many for each; less is better. The
-/// front is what nothing is shown to dominate: which of two equals came out ahead is luck.
+/// Dominance among points by their values; less is better.
+///
+/// Every point has as many values. The front is what nothing is shown to dominate: which of
+/// two equals came out ahead is luck.
 ///
 /// `is_less(a, b, k)` says whether the samples show `a` to be better than `b` in
 /// dimension `k`; it is called only where the values say so. That a point is

@@ -17,8 +17,9 @@ pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Estimat
     rate(&counts.collect::<Vec<_>>())
 }
 
-/// The rate of clusters, each with its events and its units; `None` without
-/// units.
+/// The rate of clusters, each with its events and its units.
+///
+/// `None` without units.
 ///
 /// The ratio of the sums, with the standard error of a ratio of cluster totals,
 /// `n/(n-1) sum (y - R x)^2 / (sum x)^2`, and Student's t of n - 1 degrees of
@@ -27,15 +28,7 @@ pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Estimat
 /// Lippman-Hand 1983, "If nothing goes wrong, is everything all right?", JAMA
 /// 249, p. 1743), and it is never nearer than that: units count as independent
 /// there, since nothing says otherwise.
-///
-/// ```
-/// use cullbench::statistics::rate;
-/// let found = rate(&[[2.0, 100.0], [4.0, 100.0], [3.0, 100.0]]).unwrap();
-/// assert_eq!(found.value, 0.03);
-/// let nothing = rate(&[[0.0, 100.0], [0.0, 200.0]]).unwrap();
-/// assert_eq!(nothing.upper, Some(0.01));
-/// ```
-pub fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
+fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
     let sum = |k: usize| clusters.iter().map(|c| c[k]).sum::<f64>();
     let (events, units) = (sum(0), sum(1));
     let value = events / units;
@@ -55,10 +48,10 @@ pub fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
     })
 }
 
-/// Returns true if the clusters, paired by index, show the mean of `a` to be
-/// below that of `b`: Student's paired t, two-sided at `alpha`. From one
-/// cluster, or where all differences are the same, the order of the means
-/// decides.
+/// Returns true if the clusters show the mean of `a` to be below that of `b`.
+///
+/// Paired by index: Student's paired t, two-sided at `alpha`. From one cluster, or where
+/// all differences are the same, the order of the means decides.
 ///
 /// The plain mean and no trimmed one: what is rare lies in few clusters, and
 /// those a trimmed mean leaves out.
@@ -77,6 +70,14 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
+
+    #[test]
+    fn a_rate_is_events_per_unit_and_of_no_events_has_an_upper_end() {
+        let found = rate(&[[2.0, 100.0], [4.0, 100.0], [3.0, 100.0]]).unwrap();
+        assert_eq!(found.value, 0.03);
+        let nothing = rate(&[[0.0, 100.0], [0.0, 200.0]]).unwrap();
+        assert_eq!(nothing.upper, Some(0.01));
+    }
 
     #[test]
     fn the_standard_error_is_that_of_a_ratio_of_totals() {

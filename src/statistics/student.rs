@@ -18,8 +18,9 @@ pub(super) fn quantile(p: f64, df: f64) -> f64 {
     student.map_or(f64::NAN, |student| student.inverse_cdf(p))
 }
 
-/// Slope of the least-squares line through the points `(x, y)` with its 95 %
-/// interval by Student's t (Draper and Smith 1998, "Applied Regression
+/// Slope of the least-squares line through the points `(x, y)`.
+///
+/// With its 95 % interval by Student's t (Draper and Smith 1998, "Applied Regression
 /// Analysis", sec. 1.4). `None` for fewer than three points, or all at one x.
 pub fn slope(points: &[(f64, f64)]) -> Option<Estimate> {
     let freedom = points.len().checked_sub(2).filter(|f| *f > 0)?;

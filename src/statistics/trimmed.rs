@@ -66,7 +66,7 @@ impl Trimmed {
 /// ```
 /// // One process of ten had a bad day; it does not move the mean.
 /// let values = [1.0, 1.1, 0.9, 1.0, 1.2, 0.8, 1.0, 1.1, 0.9, 40.0];
-/// let found = cullbench::statistics::trimmed_mean(&values).unwrap();
+/// let found = cullbench::measure::trimmed_mean(&values).unwrap();
 /// assert!((found.mean - 1.0).abs() < 0.02);
 /// ```
 pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
@@ -80,8 +80,9 @@ pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
     })
 }
 
-/// The trimmed mean alone, of any number of values. `None` for none, a NaN or
-/// an infinity.
+/// The trimmed mean alone, of any number of values.
+///
+/// `None` for none, a NaN or an infinity.
 pub fn centre(values: &[f64]) -> Option<f64> {
     if values.is_empty() || !values.iter().all(|value| value.is_finite()) {
         return None;

@@ -18,9 +18,10 @@ const LEAST_OF_ONE: usize = 4;
 /// Standard deviation / median absolute deviation, of a normal distribution.
 const SD_PER_MAD: f64 = 1.4826;
 
-/// Judges the cells of two stored reports. Per cell: one logarithm per process,
-/// of a time or better of a ratio within the process; the numbers of processes
-/// may differ.
+/// Judges the cells of two stored reports.
+///
+/// Per cell: one logarithm per process, of a time or better of a ratio within the process;
+/// the numbers of processes may differ.
 ///
 /// The estimate is the difference of two 20 % trimmed means with the standard
 /// error and degrees of freedom of Yuen and Welch, or those of the plain means where they

@@ -10,11 +10,9 @@ mod vectors;
 use serde::Serialize;
 
 pub use replay::{Replay, replay};
-pub use sheet::ORACLE;
-pub use vectors::{
-    BUILT_IN, BUILT_IN_NAME, Name, Names, Vector, VectorBox, VectorCamera, VectorPoint, built_in,
-    read_vectors, read_vectors_file,
-};
+pub(crate) use sheet::ORACLE;
+pub use vectors::{Name, Vector, VectorBox, VectorCamera, VectorPoint, built_in, read_vectors};
+pub(crate) use vectors::{Names, read_vectors_file};
 
 named! {
     /// Numbers that are taken to be exact.

@@ -15,8 +15,7 @@ use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyVolume, QueryCost};
 
-/// How far outside the camera's volume a box may lie that the exact test still
-/// returns.
+/// Distance outside the camera's volume up to which the exact test returns a box.
 ///
 /// A plane of unit length is rounded (u of `|d|` and of each `|n_k| x_k`),
 /// moved by c = 8 times u of `sum |n_k| A_k + |d|`, and evaluated with at most
@@ -191,8 +190,9 @@ impl Sheet<'_> {
         self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
     }
 
-    /// Queries a structure, counted and not. Returned items that `keep` rejects are
-    /// dropped; unknown ids show in the answer.
+    /// Queries a structure, counted and not.
+    ///
+    /// Returned items that `keep` rejects are dropped; unknown ids show in the answer.
     pub fn query(
         &self,
         built: &Result<Box<dyn DynIndex>, BuildError>,

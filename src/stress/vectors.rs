@@ -113,6 +113,8 @@ impl VectorCamera {
         self.fovy_deg.0 * self.aspect.0.min(1.0) >= CARRIED_DEG
     }
 
+    /// The camera of these numbers.
+    ///
     /// # Errors
     /// No such camera.
     pub fn camera(&self) -> Result<Camera, CameraError> {
@@ -247,10 +249,11 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
     read_vectors(&bytes, &path.display().to_string())
 }
 
-/// Reads a file of vectors: an object with the array `vectors`, or the array
-/// alone. Numbers may be given as the words NaN, Infinity (inf) and
-/// -Infinity (-inf); unknown fields are ignored, with a note where one is like a
-/// known or a camera has it, and so are claims that nothing can judge.
+/// Reads a file of vectors: an object with the array `vectors`, or the array alone.
+///
+/// Numbers may be given as the words NaN, Infinity (inf) and -Infinity (-inf); unknown
+/// fields are ignored, with a note where one is like a known or a camera has it, and so are
+/// claims that nothing can judge.
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.

@@ -198,8 +198,9 @@ fn row(count: u16, scale: f32) -> Vec<Aabb> {
     cubes.collect()
 }
 
-/// The scenes with their names: nothing, points, coincident and nested boxes,
-/// extreme sizes and places, inverted boxes.
+/// Degenerate scenes with their names.
+///
+/// Nothing, points, coincident and nested boxes, extreme sizes and places, inverted boxes.
 pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     let needle = |i: u16| {
         let at = f32::from(i) * 0.01;
@@ -267,11 +268,11 @@ pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
     volumes.filter_map(Result::ok).collect()
 }
 
-/// Points on the faces of a camera's view, as near as f32 has them: what a
-/// rounding that is not the usual one, or a missing epsilon, puts on the other
-/// side. For each face points all over the view (the R3 sequence of Roberts
-/// 2018), moved onto it, along the line of sight where it ends there; faces and
-/// points are about `origin`.
+/// Points on the faces of a camera's view, as near as f32 has them.
+///
+/// A rounding that is not the usual one, or a missing epsilon, puts them on the other side.
+/// For each face points all over the view (the R3 sequence of Roberts 2018), moved onto it,
+/// along the line of sight where it ends there; faces and points are about `origin`.
 pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Vec<Aabb> {
     const EACH: u32 = 48;
     const STEP: DVec3 = DVec3::new(

@@ -16,7 +16,8 @@ use glam::Vec3;
 use crate::geometry::Aabb;
 use crate::query::{AnyVolume, ItemId};
 
-pub use cases::{RandomCase, VOLUME_KINDS, edge_scenes, edge_volumes, points_on_faces, variants};
+pub(crate) use cases::variants;
+pub use cases::{RandomCase, VOLUME_KINDS, edge_scenes, edge_volumes, points_on_faces};
 pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 
@@ -53,8 +54,10 @@ impl fmt::Display for Difference {
     }
 }
 
-/// The verdict of a volume about one box in words: each plane that matters
-/// with the value of the box's p-vertex, so that a reader can check by hand.
+/// The verdict of a volume about one box in words.
+///
+/// Each plane that matters with the value of the box's p-vertex, so that a reader can check
+/// by hand.
 pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> String {
     let view = view.into();
     let [low, high] = [b.min, b.max].map(|v| format!("({}, {}, {})", v.x, v.y, v.z));

@@ -17,9 +17,10 @@ pub enum Fault {
     Differs(Difference),
 }
 
-/// One question at a time; the memory serves all of them. The reference is each box
-/// against each plane with [`AnyVolume::sees`]: no structure, no mask, no early way
-/// out.
+/// One question at a time; the memory serves all of them.
+///
+/// The reference is each box against each plane with [`AnyVolume::sees`]: no structure, no
+/// mask, no early way out.
 #[derive(Clone, Default, Debug)]
 pub struct Trial {
     items: usize,
@@ -42,7 +43,8 @@ impl Trial {
         }
     }
 
-    /// The question what a view sees, answered by the reference scan.
+    /// Sets the question: the items that a view sees, by the reference scan.
+    ///
     /// O(items * planes).
     pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
         let view = view.into();
@@ -59,8 +61,9 @@ impl Trial {
         }
     }
 
-    /// Puts the question to a structure, which appends its answer to an empty
-    /// list. O(answer + items / 64) if it is right.
+    /// Puts the question to a structure, which appends its answer to an empty list.
+    ///
+    /// O(answer + items / 64) if it is right.
     ///
     /// # Errors
     /// A panic, or how the answer differs.
@@ -104,8 +107,9 @@ impl Trial {
 }
 
 impl Fault {
-    /// The fault in words; `explain` says why an item is in the right answer or
-    /// not.
+    /// The fault in words.
+    ///
+    /// `explain` says why an item is in the right answer or not.
     pub fn explained(&self, explain: impl FnOnce(usize) -> Option<String>) -> String {
         match self {
             Fault::Panicked(message) => format!("panicked: {message}"),

@@ -15,8 +15,9 @@ use serde::{Deserialize, Serialize};
 pub struct Truth {
     /// About the items as they are stored.
     oracle: Oracle,
-    /// About the boxes as they were written, in the world, where the two
-    /// differ.
+    /// Oracle about the boxes as they were written, in the world.
+    ///
+    /// `None` where the stored boxes are the same.
     written: Option<(Oracle, Originals)>,
     /// About every item, by id.
     pub verdicts: Vec<Verdict>,
@@ -46,16 +47,20 @@ pub struct ErrorCount {
     /// Out, but returned.
     #[serde(rename = "false_positive_count")]
     pub false_positives: u64,
-    /// False positives whose stored box, which is rounded outward to f32, is truly
-    /// visible.
+    /// False positives whose stored box is truly visible.
+    ///
+    /// The stored box is rounded outward to f32.
     #[serde(rename = "excess_by_storage_count", default)]
     pub by_storage: u64,
-    /// Other false positives, dropped by the six-plane test if the camera's planes
-    /// were neither rounded nor moved; of the exact test all. The rest is the test's own.
+    /// Other false positives, due to the rounding and the moving of the planes.
+    ///
+    /// The six-plane test would drop them if the camera's planes were neither rounded nor
+    /// moved; of the exact test all. The rest is the test's own.
     #[serde(rename = "excess_by_planes_count", default)]
     pub by_planes: u64,
-    /// How deep the deepest false negative reaches into the volume, world
-    /// units; 0 if there is none.
+    /// Depth of the deepest false negative in the volume, world units.
+    ///
+    /// 0 if there is none.
     pub worst_miss: f64,
     /// How far the farthest false positive stays away from it.
     pub worst_excess: f64,
@@ -107,14 +112,16 @@ impl std::iter::Sum for ErrorCount {
 }
 
 impl Truth {
-    /// Camera level: the camera's numbers are exact, items are boxes about
-    /// `origin`. O(items), some 50 ns each. `None` if the pose makes no frame.
+    /// Camera level: the camera's numbers are exact, items are boxes about `origin`.
+    ///
+    /// O(items), some 50 ns each. `None` if the pose makes no frame.
     pub fn of_camera(camera: &Camera, origin: DVec3, items: &[Aabb]) -> Option<Truth> {
         Truth::of_written(camera, origin, items, &Originals::default())
     }
 
-    /// Camera level, about the boxes of a scene as they were written. O(items).
-    /// `None` if the pose makes no frame.
+    /// Camera level, about the boxes of a scene as they were written.
+    ///
+    /// O(items). `None` if the pose makes no frame.
     pub fn of_scene(camera: &Camera, scene: &Scene) -> Option<Truth> {
         Truth::of_written(camera, scene.origin, &scene.items, &scene.originals)
     }
@@ -183,8 +190,9 @@ impl Truth {
         items.map(|(id, (&verdict, returned))| (id, verdict, returned))
     }
 
-    /// Items that are in and not in the answer, each with how deep it reaches into
-    /// the volume, world units. O(items).
+    /// Items that are in and not in the answer, each with its depth in the volume.
+    ///
+    /// World units. O(items).
     pub fn misses(&self, items: &[Aabb], answer: &[ItemId]) -> Vec<(ItemId, f64)> {
         let answered = self.answered(answer);
         let missed = answered.filter(|(_, verdict, returned)| *verdict == Verdict::In && !returned);
@@ -192,8 +200,9 @@ impl Truth {
         deep.collect()
     }
 
-    /// The errors of an answer (any order, no id twice) about the very items
-    /// the truth was made of. O(items).
+    /// The errors of an answer about the very items the truth was made of.
+    ///
+    /// The answer in any order, no id twice. O(items).
     pub fn errors(&self, items: &[Aabb], answer: &[ItemId]) -> ErrorCount {
         let mut count = self.visible;
         for (id, verdict, returned) in self.answered(answer) {

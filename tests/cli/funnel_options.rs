@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cullbench::shown::significant;
 use cullbench::visibility::inscribed::BOXES;
 use serde_json::Value;
 
@@ -100,8 +99,14 @@ fn the_loss_of_a_table_is_charged_to_its_stage_alone() {
         told.contains("of them visible") && !told.contains("Use region"),
         "{told}"
     );
-    let seen = significant(visible);
-    assert!(told.contains(&format!("and {seen} are in front")), "{told}");
+    let (before, _) = told.split_once(" are in front").expect("their number");
+    let seen: f64 = before
+        .rsplit(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .expect("a number");
+    assert!((seen / visible - 1.0).abs() < 0.005, "{visible}: {told}");
 }
 
 /// Small things at both ends of a large scene, and the same without the far end.

@@ -2,9 +2,8 @@
 //! same order, on every edge scene.
 
 use cullbench::geometry::{Aabb, ConvexVolume};
-use cullbench::index::{BlockOrder, FrustumQuery, Input, RegionIndex, Wide, WideParams};
+use cullbench::index::{BlockOrder, FrustumQuery, Input, Pool, RegionIndex, Wide, WideParams};
 use cullbench::scene;
-use cullbench::threads::Pool;
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
 

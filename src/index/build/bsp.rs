@@ -12,8 +12,10 @@ use crate::index::items::Record;
 use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
 use crate::index::{BuildError, Info, Input, Kind, check_range};
 
-/// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
-/// generation by a priori tree structures").
+/// A binary space partition with fitted node bounds.
+///
+/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree
+/// structures".
 ///
 /// An item that a plane cuts is neither split nor stored twice: it goes to the
 /// side of its centre, and the node keeps how far each side reaches across the
@@ -31,13 +33,15 @@ pub struct BspBuilder;
 pub enum PlaneSource {
     /// `import` if the scene has its own tree, else `median`.
     Auto,
-    /// Axis-parallel planes by the surface area heuristic, 16 bins (Wald 2007,
-    /// "On fast construction of SAH-based bounding volume hierarchies").
+    /// Axis-parallel planes by the surface area heuristic, 16 bins.
+    ///
+    /// Wald 2007, "On fast construction of SAH-based bounding volume hierarchies".
     Sah,
     /// The median of the centres along the widest axis: perfectly balanced.
     Median,
-    /// The map's own tree (a Doom WAD has one); items that its branches leave
-    /// together are divided by `sah`.
+    /// The map's own tree (a Doom WAD has one).
+    ///
+    /// Items that its branches leave together are divided by `sah`.
     Import,
 }
 

@@ -8,8 +8,9 @@ use glam::{DVec3, Vec3};
 use crate::geometry::{Aabb, LANES};
 use crate::index::items::Record;
 
-/// Moves the records that belong to the back to the front of the slice, in any
-/// order, and returns their number. O(n).
+/// Moves the records of the back to the front of the slice; returns their number.
+///
+/// In any order. O(n).
 pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usize {
     let mut back = 0;
     for i in 0..records.len() {
@@ -28,10 +29,11 @@ fn centres(records: &[Record]) -> Aabb {
     Aabb::of_points(records.iter().map(|r| r.bounds.centre()))
 }
 
-/// The median along the widest axis, or beside it where it would separate items of
-/// one centre: regions that tile space lie in layers, and a plane between two
-/// layers cuts none of them. Axis after axis, widest first; a side gets at
-/// least a quarter of the items (of few, at least one), or else the layer is
+/// The median along the widest axis, or a plane beside it between two layers.
+///
+/// Beside it where it would separate items of one centre: regions that tile space lie in
+/// layers, and a plane between two layers cuts none of them. Axis after axis, widest first;
+/// a side gets at least a quarter of the items (of few, at least one), or else the layer is
 /// divided after all.
 pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let centres = centres(records);
@@ -81,8 +83,9 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
 /// Bins per axis of the surface area heuristic.
 const BINS: usize = 16;
 
-/// The best of 15 planes on each axis by area times count, both sides; `None`
-/// if all centres coincide.
+/// The best of 15 planes on each axis by area times count, both sides.
+///
+/// `None` if all centres coincide.
 pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
     let centres = centres(records);
     let low = centres.min;

@@ -16,9 +16,10 @@ use crate::index::tree::{Built, PackedTree, Tree, TreeBuilder};
 use crate::index::{Info, Input, Kind, check_range};
 use crate::query::ItemId;
 
-/// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
-/// ordered clustering for bounding volume hierarchy construction", with
-/// reinsertion: Meister and Bittner 2018b), by obvhs.
+/// A bounding volume hierarchy built bottom-up, by obvhs.
+///
+/// PLOC (Meister and Bittner 2018, "Parallel locally ordered clustering for bounding volume
+/// hierarchy construction") with reinsertion (Meister and Bittner 2018b).
 pub type Bvh = Tree<BvhBuilder>;
 
 /// Builder of [`Bvh`].
@@ -79,8 +80,9 @@ impl BvhPreset {
 struct Stacks {
     /// Item ids, stack by stack.
     members: Vec<ItemId>,
-    /// First member of each stack, and the end of the last one; empty if every item
-    /// is a stack of its own.
+    /// First member of each stack, and the end of the last one.
+    ///
+    /// Empty if every item is a stack of its own.
     starts: Vec<u32>,
 }
 

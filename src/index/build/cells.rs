@@ -11,8 +11,9 @@ use crate::index::items::Record;
 use crate::index::tree::{Built, Part, Splitter, Tree, TreeBuilder, build_top_down};
 use crate::index::{Info, Input, Kind, check_range};
 
-/// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
-/// encoding"; loose variant Ulrich 2000).
+/// An octree with fitted nodes.
+///
+/// Meagher 1982, "Geometric modeling using octree encoding"; loose variant Ulrich 2000.
 ///
 /// A textbook octree keeps an item that crosses a split plane at the inner
 /// node. In a flat city, or among needles, nearly everything crosses one and
@@ -24,8 +25,10 @@ use crate::index::{Info, Input, Kind, check_range};
 /// away.
 pub type Octree = Tree<CellBuilder<3>>;
 
-/// A quadtree (Finkel and Bentley 1974) over the two axes in which the scene is
-/// widest, with fitted three-dimensional node bounds, so that the height still culls.
+/// A quadtree over the two axes in which the scene is widest.
+///
+/// Finkel and Bentley 1974. Node bounds are fitted and three-dimensional, so that the
+/// height still culls.
 ///
 /// For terrain, cities and maps, which are flat. Cells that are much higher than wide
 /// are columns of slabs with as many items each (docs/adr/0012); in a flat scene
@@ -98,8 +101,10 @@ defaults! {
         pub leaf: u32 = 32,
         /// Most levels of cells (0 to 64).
         pub depth: u32 = 24,
-        /// Looseness (1 to 16): 1 sends every item down with its centre; k > 1
-        /// keeps items larger than k - 1 edges of the smaller cell where they are.
+        /// Looseness (1 to 16) of the cells.
+        ///
+        /// 1 sends every item down with its centre; k > 1 keeps items larger than k - 1
+        /// edges of the smaller cell where they are.
         pub loose: f32 = 1.0,
     }
 }
@@ -120,10 +125,11 @@ struct CellSplitter<'a> {
     columns: Option<Columns>,
     /// Most splits on the way from the root.
     depth: u32,
-    /// An item stays at a cell once it is larger than this many edges of the next
-    /// smaller cell. With looseness (Ulrich, "Loose octrees", Game Programming Gems 1,
-    /// p. 444) cells count as grown by that factor, so this is `loose - 1`; infinite
-    /// for items that always descend.
+    /// Edges of the next smaller cell that an item must exceed to stay at a cell.
+    ///
+    /// With looseness (Ulrich, "Loose octrees", Game Programming Gems 1, p. 444) cells
+    /// count as grown by that factor, so this is `loose - 1`; infinite for items that
+    /// always descend.
     reach: f32,
     sorted: Vec<Record>,
 }

@@ -28,10 +28,11 @@ impl Boundable for Aabb {
     }
 }
 
-/// Clusters boxes bottom-up (PLOC), reinserts, and puts leaves together, as
-/// obvhs 0.4.0 does with the same parameters; `pre_split` is for triangles only.
-/// O(n log n): clustering has a bound, and what would be reinserted in quadratic time
-/// stays where it is.
+/// Clusters boxes bottom-up (PLOC), reinserts, and merges leaves.
+///
+/// The steps of obvhs 0.4.0 with the same parameters; `pre_split` is for triangles only. O(n log
+/// n): clustering has a bound, and what would be reinserted in quadratic time stays where
+/// it is.
 pub fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     let mut tree = clustered(boxes, &params);
     let share = params.reinsertion_batch_ratio;

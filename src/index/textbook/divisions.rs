@@ -11,18 +11,20 @@ use crate::index::build::cells::widest_axes;
 use crate::index::items::Record;
 use crate::index::{Input, ploc};
 
-/// An octree (Meagher 1982, "Geometric modeling using octree encoding") as the
-/// lecture on visibility means it (slides "Visibility", "Region search"). O(log n
-/// + answers) per query where items are small against their cells.
+/// An octree as the lecture on visibility describes it.
+///
+/// Meagher 1982, "Geometric modeling using octree encoding"; slides "Visibility", "Region
+/// search". O(log n + answers) per query where items are small against their cells.
 ///
 /// An item that crosses the middle of a cell stays with the cell, however small it is,
 /// and every query that reaches the cell tests it: not so in [`Octree`](crate::index::Octree),
 /// whose items all descend with their centres, nor in loose octrees (Ulrich 2000).
 pub type OctreeTextbook = Textbook<Cells<3>>;
 
-/// A quadtree (Finkel and Bentley 1974, "Quad trees: a data structure for
-/// retrieval on composite keys") as the lecture on visibility means it (slides
-/// "Visibility", "Region search"), over boxes.
+/// A quadtree over boxes as the lecture on visibility describes it.
+///
+/// Finkel and Bentley 1974, "Quad trees: a data structure for retrieval on composite keys";
+/// slides "Visibility", "Region search".
 ///
 /// An item lies with the smallest cell that contains it ([`OctreeTextbook`]). Cells
 /// are columns through the whole scene, over the two axes in which it is widest. Takes
@@ -108,9 +110,10 @@ fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
     part
 }
 
-/// A BSP tree (Fuchs, Kedem and Naylor 1980, "On visible surface generation by a
-/// priori tree structures"; lecture on visibility, slides "BSP trees" and "Region
-/// search").
+/// A BSP tree as the lecture on visibility describes it.
+///
+/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree
+/// structures"; slides "BSP trees" and "Region search".
 ///
 /// Region search takes the side of the plane that the point is on: O(log n) where planes
 /// cut few items. A frustum is tested against the bounds of each node's items.
@@ -240,9 +243,10 @@ impl Planes<'_> {
     }
 }
 
-/// A bounding volume hierarchy (Clark 1976, "Hierarchical geometric models for
-/// visible surface algorithms"; the crate builds it bottom-up, by PLOC: Meister and
-/// Bittner 2018). O(log n + answers) per query.
+/// A bounding volume hierarchy in plain recursive form.
+///
+/// Clark 1976, "Hierarchical geometric models for visible surface algorithms"; the crate
+/// builds it bottom-up, by PLOC: Meister and Bittner 2018. O(log n + answers) per query.
 ///
 /// The lecture on visibility does not name it; engines use it instead of the lecture's
 /// trees.

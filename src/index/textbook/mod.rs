@@ -29,8 +29,9 @@ defaults! {
     pub struct TextbookParams {
         /// Most items that are not divided any further (1 to 4096).
         pub leaf: u32 = 8,
-        /// Most levels below the root (0 to 256), and so the depth of the recursion:
-        /// items that share a node there, such as coincident ones, stay together.
+        /// Most levels below the root (0 to 256): the depth of the recursion.
+        ///
+        /// Items that share a node there, such as coincident ones, stay together.
         pub depth: u32 = 64,
     }
 }
@@ -44,11 +45,13 @@ impl TextbookParams {
 
 /// A node with its items and subtrees.
 pub struct Node {
-    /// Closed bounds that contain every item from here down, bit for bit: a verdict
-    /// about the node holds for all of them (docs/NUMERICS.md).
+    /// Closed bounds that contain every item from here down, bit for bit.
+    ///
+    /// A verdict about the node holds for all of them (docs/NUMERICS.md).
     bounds: Aabb,
-    /// For the side of a dividing plane: points outside of this half-space are in none
-    /// of the items from here down.
+    /// Half-space on one side of a dividing plane.
+    ///
+    /// Points outside of it are in none of the items from here down.
     half_space: Option<Plane>,
     /// The items that the node itself keeps, and their ids.
     boxes: Vec<Aabb>,

@@ -58,8 +58,10 @@ pub trait TreeBuilder: Send + Sync {
     fn build(input: &Input<'_>, params: &Self::Params) -> Built;
 }
 
-/// A packed tree by the builder `B`: [`Octree`](super::Octree),
-/// [`Quadtree`](super::Quadtree), [`Bvh`](super::Bvh) and [`Bsp`](super::Bsp).
+/// A packed tree by the builder `B`.
+///
+/// [`Octree`](super::Octree), [`Quadtree`](super::Quadtree), [`Bvh`](super::Bvh) and
+/// [`Bsp`](super::Bsp).
 pub struct Tree<B: TreeBuilder> {
     pub(super) tree: PackedTree,
     /// One per node with [`TreeBuilder::BY_PLANES`], else none.

@@ -14,8 +14,9 @@ pub struct TreeNode {
     pub first: u32,
     /// Number of items of the subtree.
     pub count: u32,
-    /// The node after this subtree in depth-first order. A leaf's is its own
-    /// successor.
+    /// The node after this subtree in depth-first order.
+    ///
+    /// A leaf's is its own successor.
     pub after: u32,
 }
 

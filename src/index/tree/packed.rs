@@ -147,9 +147,10 @@ impl PackedTree {
         }
     }
 
-    /// Takes over the new bounds of moved items without changing the tree's
-    /// shape: refits the nodes above them. False, with the tree unchanged, if an
-    /// item enters or leaves the tree (it is or was empty).
+    /// Takes over the new bounds of moved items: refits the nodes above them.
+    ///
+    /// The tree's shape does not change. False, with the tree unchanged, if an item enters
+    /// or leaves the tree (it is or was empty).
     ///
     /// Calls `fitted` for every node that changed, children first. O(moved * depth).
     pub fn refit(

@@ -11,8 +11,9 @@ use crate::index::items::Record;
 pub struct Part<C> {
     /// Number of items of the part.
     pub items: usize,
-    /// State that the splitter gets back with the part; `None` for a part that
-    /// the splitter does not divide further.
+    /// State that the splitter gets back with the part.
+    ///
+    /// `None` for a part that the splitter does not divide further.
     pub cell: Option<C>,
 }
 

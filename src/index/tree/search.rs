@@ -34,9 +34,10 @@ thread_local! {
 }
 
 impl PackedTree {
-    /// Passes every item that the volume sees to the sink: items that hold a point in
-    /// tree order; items of a frustum by level, accepted subtrees first, then the
-    /// tested items of leaves.
+    /// Passes every item that the volume sees to the sink.
+    ///
+    /// Items that hold a point in tree order; items of a frustum by level, accepted
+    /// subtrees first, then the tested items of leaves.
     #[inline(always)]
     pub fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if !Q::IS_POINT {

@@ -24,8 +24,9 @@ pub struct Links {
     pub leaves: LaneMask,
 }
 
-/// A tree of wide nodes: sixteen lanes each, in tree order, any descendants of one
-/// tree node. 40 bytes per lane.
+/// A tree of wide nodes: sixteen lanes each, in tree order.
+///
+/// The lanes are any descendants of one tree node. 40 bytes per lane.
 #[derive(Default)]
 pub struct WideNodes {
     pub blocks: Vec<BoxBlock>,
@@ -38,10 +39,11 @@ pub struct WideNodes {
 const NO_LANE: u32 = u32::MAX;
 
 impl WideNodes {
-    /// Groups the nodes of a tree in depth-first order. Nodes are replaced by their
-    /// children, the largest surface first, as long as they fit: that node is the
-    /// likeliest to straddle (Wald, Benthin and Boulos 2008, "Getting rid of
-    /// packets", p. 52). No wide node if the root is a leaf. O(nodes).
+    /// Groups the nodes of a tree in depth-first order.
+    ///
+    /// Nodes are replaced by their children, the largest surface first, as long as they
+    /// fit: that node is the likeliest to straddle (Wald, Benthin and Boulos 2008, "Getting
+    /// rid of packets", p. 52). No wide node if the root is a leaf. O(nodes).
     pub fn new(nodes: &[TreeNode]) -> WideNodes {
         let mut wide = WideNodes {
             lane_of: vec![NO_LANE; nodes.len()],

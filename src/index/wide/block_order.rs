@@ -17,8 +17,9 @@ use crate::threads::{map, share};
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BlockOrder {
-    /// Recursive halving at the median of the widest axis, always at a multiple of
-    /// the block size of the halves.
+    /// Recursive halving at the median of the widest axis.
+    ///
+    /// Always at a multiple of the block size of the halves.
     #[default]
     Median,
     /// Sorted along the Morton curve of the centres.

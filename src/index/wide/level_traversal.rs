@@ -24,8 +24,10 @@ pub struct LevelTraversal<'a, V, C> {
 }
 
 impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
-    /// Sorts all blocks of a frontier: straddling children go to the frontier
-    /// `below`, runs of items wholly inside to the sink.
+    /// Sorts all blocks of a frontier.
+    ///
+    /// Straddling children go to the frontier `below`, runs of items wholly inside to the
+    /// sink.
     #[inline(always)]
     pub fn sort_level(
         &mut self,
@@ -50,9 +52,11 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
         self.pass_run(run.take())
     }
 
-    /// [`LevelTraversal::sort_level`] for the level above the leaves: leaves wholly
-    /// inside are collected in `whole` and passed to the sink afterwards, a row of
-    /// prefetched ids each. Run ends are unpredictable branches, so they are not tested.
+    /// [`LevelTraversal::sort_level`] for the level above the leaves.
+    ///
+    /// Leaves wholly inside are collected in `whole` and passed to the sink afterwards, a
+    /// row of prefetched ids each. Run ends are unpredictable branches, so they are not
+    /// tested.
     #[inline(always)]
     pub fn sort_last_level(
         &mut self,

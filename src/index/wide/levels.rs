@@ -63,8 +63,9 @@ pub struct Layer<'t> {
 }
 
 impl Layer<'_> {
-    /// Positions of the items below some lanes of a block, run by run; there are
-    /// `count` items in all.
+    /// Positions of the items below some lanes of a block, run by run.
+    ///
+    /// There are `count` items in all.
     #[inline(always)]
     pub fn items_of(
         &self,

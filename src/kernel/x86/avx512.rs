@@ -8,8 +8,7 @@ use crate::kernel::Work;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
 instruction_set! {
-    /// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
-    /// that AVX2 stands for here.
+    /// Proof that the processor has AVX-512 (F, VL, BW, DQ) and the AVX2 set.
     Avx512, "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt"
 }
 

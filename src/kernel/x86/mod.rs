@@ -50,8 +50,9 @@ pub fn detect(kernel: Kernel) -> bool {
     }
 }
 
-/// Does the work with this instruction set, or with the portable one where the
-/// processor lacks it.
+/// Does the work with this instruction set.
+///
+/// With the portable one where the processor lacks it.
 // A call would store the work word by word and load it by vectors, which stalls.
 #[inline(always)]
 pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {

@@ -45,8 +45,9 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
 /// Most words that are copied row by row.
 const FEW: usize = 16 * LANES;
 
-/// `extend(out, &words[places])`, row by row where there are few: a call of memcpy
-/// costs more than they do. What lies behind them in `words` is read too.
+/// `extend(out, &words[places])`, row by row where there are few.
+///
+/// A call of memcpy costs more than they do. The words behind them are read too.
 #[inline(always)]
 pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     let few = &words[places.clone()];

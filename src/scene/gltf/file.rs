@@ -233,8 +233,9 @@ impl<'f> File<'f> {
         Ok(values.chunks_exact(width).map(vector).collect())
     }
 
-    /// Numbers of an accessor, `width` for each element, normalised where it says so;
-    /// the reason where its bytes are not plain.
+    /// Numbers of an accessor, `width` for each element.
+    ///
+    /// Normalised where the accessor says so; the reason where its bytes are not plain.
     pub fn values(
         &self,
         index: Index<Accessor>,

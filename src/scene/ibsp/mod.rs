@@ -42,8 +42,9 @@ pub struct QuakeMap {
     pub clusters: usize,
     /// Surfaces without triangles, which are no items: flares.
     pub bare: usize,
-    /// Bytes of a row, and a row of bits for each cluster; `None` where the map has no
-    /// such table.
+    /// Bytes of a row, and a row of bits for each cluster.
+    ///
+    /// `None` where the map has no such table.
     seen: Option<(usize, Vec<u8>)>,
 }
 

@@ -51,8 +51,10 @@ struct Lump {
 }
 
 impl<'a> Wad<'a> {
-    /// Reads the directory. The place of a lump is checked when the lump is read:
-    /// damage in another does not concern a map.
+    /// Reads the directory.
+    ///
+    /// The position of a lump is checked when the lump is read: damage in another does not
+    /// concern a map.
     pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self> {
         let mut wad = Wad {
             file,
@@ -87,8 +89,9 @@ impl<'a> Wad<'a> {
         Ok(wad)
     }
 
-    /// The names of the maps and the indices of their markers, in file order: of maps
-    /// of one name the last, as engines have it.
+    /// The names of the maps and the indices of their markers, in file order.
+    ///
+    /// The last of maps of one name, as engines have it.
     pub fn markers(&self) -> Vec<(&str, usize)> {
         let mut seen = HashSet::new();
         let all = (0..self.lumps.len()).rev().filter(|&at| self.is_marker(at));

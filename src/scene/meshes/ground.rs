@@ -90,9 +90,10 @@ const TREES: f64 = 0.4;
 /// Cards of a bush.
 const CARDS: usize = 12;
 
-/// Trees and bushes on a terrain: ground first, then plants until there are enough
-/// triangles. A tree is a closed trunk and three closed cones; a bush is a dozen leaf
-/// cards, cut out and two-sided.
+/// Trees and bushes on a terrain.
+///
+/// Ground first, then plants until there are enough triangles. A tree is a closed trunk and
+/// three closed cones; a bush is a dozen leaf cards, cut out and two-sided.
 pub fn forest(triangles: usize, seed: u64) -> Surfaces {
     let mut surfaces = Surfaces::about(DVec3::ZERO);
     let ground = Ground::of((triangles as f64 * GROUND) as usize, seed);

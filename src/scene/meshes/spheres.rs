@@ -91,8 +91,9 @@ const FACES: [usize; 60] = [
     8, 3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1,
 ];
 
-/// Unit directions and the triangles between them: 20 f² triangles and 10 f² + 2
-/// points for a frequency f >= 1.
+/// Unit directions and the triangles between them.
+///
+/// 20 f² triangles and 10 f² + 2 points for a frequency f >= 1.
 pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let f = frequency.max(1);
     let (mut points, mut triangles) = (Vec::new(), Vec::new());

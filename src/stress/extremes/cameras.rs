@@ -31,8 +31,9 @@ pub enum Shapes {
 struct Hull {
     /// Near corners, then far ones; bit 0 is right, bit 1 top.
     corners: [DVec3; 8],
-    /// Inward, in the order of the corners' bits: left, right, bottom, top,
-    /// near, far.
+    /// Inward normals, in the order of the corners' bits.
+    ///
+    /// Left, right, bottom, top, near, far.
     normals: [DVec3; 6],
 }
 
@@ -67,8 +68,9 @@ impl Hull {
     }
 }
 
-/// `count` boxes about a camera's volume, in scene-local coordinates. One in
-/// 64 is inverted, and so empty. None if the lens has no corners.
+/// `count` boxes about a camera's volume, in scene-local coordinates.
+///
+/// One in 64 is inverted, and so empty. None if the lens has no corners.
 pub fn adversarial(
     rng: &mut SeededRng,
     camera: &Camera,

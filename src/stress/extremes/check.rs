@@ -179,8 +179,9 @@ impl Case {
         self.truth.errors(&self.items, seen)
     }
 
-    /// Checks every culling test and every structure. Structures are built over
-    /// the first `share` items.
+    /// Checks every culling test and every structure.
+    ///
+    /// Structures are built over the first `share` items.
     pub fn check(&self, structures: &[StructureSpec], share: usize) -> Findings {
         let verdicts = self.truth.verdicts.iter();
         let boxes = self.items.len() as u64;

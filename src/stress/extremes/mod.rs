@@ -18,7 +18,8 @@ use crate::verify::VOLUME_KINDS;
 
 use cameras::adversarial;
 pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft, Shapes};
-pub use check::{Case, Fault, Findings, SCALAR, Tally};
+pub(crate) use check::SCALAR;
+pub use check::{Case, Fault, Findings, Tally};
 pub use volumes::{PLANES_FAMILIES, PlanesFamily};
 
 /// Cases of each variant that make ten million boxes at camera level.

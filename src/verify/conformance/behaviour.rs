@@ -13,8 +13,9 @@ use crate::kernel::Kernel;
 use crate::query::{Located, QueryVolume, Ranges};
 use crate::threads::Pool;
 
-/// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
-/// [`QueryVolume`], over the items and over the cubes of their spheres.
+/// Checks that `visible` returns exactly `{ i : view.sees(items[i]) }`.
+///
+/// For every kind of [`QueryVolume`], over the items and over the cubes of their spheres.
 pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
     // Queries with every kind of view of some of the volumes.
     let some = |step, most| {
@@ -97,9 +98,10 @@ pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
     each(scenes, |asked, index: &mut T| asked.locate_is_right(index))
 }
 
-/// `query_many` passes the ids of `query` for every point in order:
-/// whatever the size of the batch, with points that come again, lie on faces or
-/// outside, or are no numbers.
+/// Checks that `query_many` passes the ids of `query` for every point, in order.
+///
+/// For batches of any size, with points that come again, lie on faces or outside, or are no
+/// numbers.
 pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain([cells()]);
     let scenes = scenes.chain(generated_scenes(500)?);
@@ -182,9 +184,10 @@ fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) ->
 /// Updates in a row, for what goes wrong at the twentieth.
 const MANY_UPDATES: usize = 50;
 
-/// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the
-/// other, and all of them far away, a structure that refits answers as a newly built one:
-/// every view, and points one by one and many.
+/// Checks that a structure that refits answers as a newly built one.
+///
+/// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the other, and all
+/// of them far away: every view, and points one by one and many.
 pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = ["all the same", "needles", "inverted among sound"];
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
@@ -271,10 +274,12 @@ pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// Items that move are taken over if the structure says that it refits, and
-/// declined if not; it has a tree order if it says so, and then answers in
-/// ranges of it are the reference set. A build looks at how many threads it may
-/// use if it says so, and answers the same with several.
+/// Checks the structure's [`Info`](crate::index::Info) against its behaviour.
+///
+/// Items that move are taken over if the structure says that it refits, and declined if
+/// not; it has a tree order if it says so, and then answers in ranges of it are the
+/// reference set. A build looks at how many threads it may use if it says so, and answers
+/// the same with several.
 pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
     let says = T::INFO;
     each(generated_scenes(500)?, |asked, index: &mut T| {

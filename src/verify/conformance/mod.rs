@@ -86,8 +86,9 @@ pub fn properties<T: RegionIndex>() -> &'static [Property] {
 /// Seeds of the random cases of each property.
 const SEEDS: Range<u64> = 0..64;
 
-/// `visible` returns exactly what a look at every box returns, where scenes
-/// are degenerate and planes touch boxes.
+/// Checks that `visible` returns what a look at every box returns.
+///
+/// In degenerate scenes, with planes that touch boxes.
 pub fn reference_set_on_edge_scenes<T: RegionIndex>() -> Outcome {
     each(edges(), |asked, index: &mut T| {
         asked.visible_is_right(index)
@@ -135,8 +136,9 @@ pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// A NaN or infinite bound makes the build fail and is named, whatever box
-/// and coordinate it stands in; the first one, if there are more.
+/// Checks that a NaN or infinite bound makes the build fail and is named.
+///
+/// In any box and coordinate; of several, the first.
 pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
     let cube = |i: u8| Aabb::around(Vec3::splat(f32::from(i)), Vec3::ONE);
     let sound: Vec<Aabb> = (0..40).map(cube).collect();
@@ -163,8 +165,9 @@ pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
     Ok(())
 }
 
-/// Any sink gets the same ids; one that breaks gets no further call, has what came
-/// first, and the query says `Break`.
+/// Checks that any sink gets the same ids, and a sink that breaks no further call.
+///
+/// A sink that breaks has what came first, and the query returns `Break`.
 pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
     each(cases(SEEDS), |asked, index: &mut T| {

@@ -59,7 +59,7 @@ impl Meeting {
 ///
 /// Exact for coordinates of corners, origins and eyes and components of direction
 /// that are 0 or from 2^-100 to 2^100 in size: products of six of them, of two depths
-/// as fractions, are then within what [`Expansion`] holds.
+/// as fractions, are then within what an expansion holds.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleProbe {
     ray: Ray,
