@@ -247,8 +247,8 @@ pub fn against(caption: &str, mut points: Vec<Measured>) -> Option<Figure> {
     // Half a power below the axis, which begins a power below the least error.
     let none = 10f64.powf(least.log10().floor() - 1.5);
     let gutter = none * 2.0;
+    let placed = |error: f64| error.max(if error > 0.0 { gutter } else { none });
     for (_, point) in &mut points {
-        let placed = |error: f64| error.max(if error > 0.0 { gutter } else { none });
         point.at[1] = placed(point.at[1]);
         point.ends = point.ends.map(|ends| ends.map(placed));
     }

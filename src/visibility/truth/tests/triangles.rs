@@ -107,14 +107,14 @@ fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let truth = SampleTruth::of(&index, &rays, grid, 1);
         let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
         let mut samples = vec![0; surfaces.items()];
-        for place in 0..grid.samples() {
-            let ray = rays.sample(grid, place as u32 % 6, place as u32 / 6);
+        for (place, own) in (0..).zip(&fronts) {
+            let ray = rays.sample(grid, place % 6, place / 6);
             let wanted = seen(&ray, &surfaces);
             let found = index.front_of(&ray);
             let found = [found.front, found.before];
             assert_eq!(found, wanted, "world {world}, {ray:?}, {surfaces:?}");
             let front = wanted[0].first().copied().unwrap_or(NO_ITEM);
-            assert_eq!(fronts[place], front);
+            assert_eq!(*own, front);
             let items = wanted.iter().flatten();
             items.for_each(|&item| samples[item as usize] += 1);
             met += usize::from(!wanted[0].is_empty());
