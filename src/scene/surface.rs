@@ -54,7 +54,7 @@ pub struct Surfaces {
 
 /// The six faces of a box, two triangles each: corners as [`Aabb::corner`] numbers
 /// them.
-const BOX: [[u32; 3]; 12] = {
+pub(super) const BOX: [[u32; 3]; 12] = {
     let mut triangles = [[0; 3]; 12];
     let mut axis = 0;
     while axis < 3 {

@@ -12,7 +12,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 use glam::{DMat4, DVec3, DVec4};
 use gltf::json::accessor::{Accessor, ComponentType};
-use gltf::json::validation::Checked;
+use gltf::json::buffer::View;
+use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Index, Node, Root, Value};
 use serde::Deserialize;
 
@@ -223,8 +224,10 @@ impl<'f> File<'f> {
 
     /// Vectors of an accessor, `width` numbers each.
     pub fn vectors(&self, index: Index<Accessor>, width: usize, place: &str) -> Result<Vec<DVec4>> {
+        if let Some(why) = self.unread(index) {
+            return Err(self.error(place, why, "plain accessors"));
+        }
         let values = self.values(index, width, place)?;
-        let values = values.map_err(|why| self.error(place, why, "plain accessors"))?;
         let vector = |numbers: &[f64]| {
             let mut vector = [0.0; 4];
             vector[..width].copy_from_slice(numbers);
@@ -233,56 +236,107 @@ impl<'f> File<'f> {
         Ok(values.chunks_exact(width).map(vector).collect())
     }
 
+    /// Why the bytes of an accessor are not read, if they are not.
+    pub fn unread(&self, index: Index<Accessor>) -> Option<String> {
+        let accessor = self.root.accessors.get(index.value())?;
+        let Some(view) = accessor.buffer_view else {
+            let why = || "has accessors without bytes".to_owned();
+            return accessor.sparse.is_none().then(why);
+        };
+        let view = self.root.buffer_views.get(view.value())?;
+        let has_bytes = !self.buffers.get(view.buffer.value())?.is_empty();
+        self.compressed(view.extensions.as_ref()?.others.keys(), has_bytes)
+    }
+
+    /// The reason of what an extension compresses, unless core glTF has it too.
+    pub fn compressed<'e>(
+        &self,
+        mut extensions: impl Iterator<Item = &'e String>,
+        is_plain_too: bool,
+    ) -> Option<String> {
+        let required = &self.root.extensions_required;
+        let name = extensions.find(|name| !is_plain_too || required.contains(name))?;
+        Some(format!("is compressed ({})", shortened(name, 40)))
+    }
+
     /// Numbers of an accessor, `width` for each element.
     ///
-    /// Normalised where the accessor says so; the reason where its bytes are not plain.
-    pub fn values(
-        &self,
-        index: Index<Accessor>,
-        width: usize,
-        place: &str,
-    ) -> Result<Result<Vec<f64>, String>> {
+    /// Normalised where the accessor says so.
+    pub fn values(&self, index: Index<Accessor>, width: usize, place: &str) -> Result<Vec<f64>> {
         let accessor = self.get(&self.root.accessors, index, place)?;
-        let place = format!("accessors[{}]", index.value());
+        let place = &format!("accessors[{}]", index.value());
+        let no_type = || self.error(place, "no known type", "a type of glTF 2.0");
         let (Some(kind), Checked::Valid(dimensions)) = (component(accessor), accessor.type_) else {
-            return Err(self.error(place, "no known type", "a type of glTF 2.0"));
+            return Err(no_type());
         };
         if dimensions.multiplicity() != width {
             let found = format!("elements of {} numbers", dimensions.multiplicity());
             return Err(self.error(place, found, &format!("{width} numbers")));
         }
-        let Some(view) = accessor.buffer_view.filter(|_| accessor.sparse.is_none()) else {
-            return Ok(Err("has sparse accessors or none with bytes".to_owned()));
+        let (count, form) = (accessor.count.0, (kind, width, accessor.normalized));
+        let mut all = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.unwrap_or_default();
+                self.elements(view, offset, count, form, place)?
+            }
+            None if count > self.bytes as u64 => {
+                let expected = format!("at most {}, one for each byte of buffers", self.bytes);
+                return Err(self.error(place, format!("{count} elements of zeros"), &expected));
+            }
+            None => vec![0.0; count as usize * width],
         };
+        if let Some(sparse) = &accessor.sparse {
+            let (at, own, count) = (&sparse.indices, &sparse.values, sparse.count.0);
+            let Checked::Valid(of_index) = at.component_type else {
+                return Err(no_type());
+            };
+            let of_index = (of_index.0, 1, false);
+            let indices = self.elements(at.buffer_view, at.byte_offset, count, of_index, place)?;
+            let values = self.elements(own.buffer_view, own.byte_offset, count, form, place)?;
+            for (index, value) in indices.into_iter().zip(values.chunks_exact(width)) {
+                let element = all.chunks_exact_mut(width).nth(index as usize);
+                let found = || format!("sparse element {index}");
+                let error = || self.error(place, found(), "an index below its count");
+                element.ok_or_else(error)?.copy_from_slice(value);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Numbers of elements of a view: their kind, width and whether normalised.
+    fn elements(
+        &self,
+        view: Index<View>,
+        offset: USize64,
+        count: u64,
+        (kind, width, is_normalised): (ComponentType, usize, bool),
+        place: &str,
+    ) -> Result<Vec<f64>> {
         let of_view = format!("{place}.bufferView");
         let view = self.get(&self.root.buffer_views, view, &of_view)?;
-        let extensions = view.extensions.as_ref();
-        if let Some(name) = extensions.and_then(|e| e.others.keys().next()) {
-            return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
-        }
         let buffer = Index::new(view.buffer.value() as u32);
-        let buffer = self.get(&self.buffers, buffer, &place)?;
+        let buffer = self.get(&self.buffers, buffer, place)?;
         if buffer.is_empty() {
             let place = format!("buffers[{}]", view.buffer.value());
             return Err(self.error(place, "no bytes", "a uri, or the BIN chunk of a GLB"));
         }
         let size = kind.size() * width;
-        let stride = view.byte_stride.filter(|_| accessor.count.0 > 1);
+        let stride = view.byte_stride.filter(|_| count > 1);
         let stride = stride.map_or(size, |stride| stride.0);
-        let count = accessor.count.0;
-        let offset = accessor.byte_offset.unwrap_or_default().0;
         let first = view.byte_offset.unwrap_or_default().0;
         let bytes = part(buffer, first, view.byte_length.0);
-        let needed = (count.saturating_sub(1)).saturating_mul(stride as u64) + size as u64;
-        let own = bytes.and_then(|bytes| part(bytes, offset, needed));
+        let needed = (count.saturating_sub(1)).saturating_mul(stride as u64);
+        let needed = needed.saturating_add(size as u64);
+        let own = bytes.and_then(|bytes| part(bytes, offset.0, needed));
         let Some(own) = own.filter(|_| stride >= size) else {
             let found = format!("{count} elements that end behind their buffer");
             return Err(self.error(place, found, "elements within it"));
         };
         let elements = own.chunks(stride).take(count as usize);
         let numbers = elements.flat_map(|element| element[..size].chunks_exact(kind.size()));
-        let numbers = numbers.map(|bytes| number(bytes, kind, accessor.normalized));
-        Ok(Ok(numbers.collect()))
+        Ok(numbers
+            .map(|bytes| number(bytes, kind, is_normalised))
+            .collect())
     }
 }
 
@@ -295,15 +349,14 @@ pub fn component(accessor: &Accessor) -> Option<ComponentType> {
 
 /// A little-endian number; a fraction where it is normalised.
 fn number(bytes: &[u8], kind: ComponentType, is_normalised: bool) -> f64 {
-    let two = || [bytes[0], bytes[1]];
-    let four = || [bytes[0], bytes[1], bytes[2], bytes[3]];
+    let mut four = [0; 4];
+    four[..bytes.len()].copy_from_slice(bytes);
+    let word = u32::from_le_bytes(four);
     let raw = match kind {
-        ComponentType::I8 => f64::from(bytes[0] as i8),
-        ComponentType::U8 => f64::from(bytes[0]),
-        ComponentType::I16 => f64::from(i16::from_le_bytes(two())),
-        ComponentType::U16 => f64::from(u16::from_le_bytes(two())),
-        ComponentType::U32 => f64::from(u32::from_le_bytes(four())),
-        ComponentType::F32 => f64::from(f32::from_le_bytes(four())),
+        ComponentType::I8 => f64::from(word as i8),
+        ComponentType::I16 => f64::from(word as i16),
+        ComponentType::F32 => f64::from(f32::from_bits(word)),
+        ComponentType::U8 | ComponentType::U16 | ComponentType::U32 => f64::from(word),
     };
     normalised(raw, kind, is_normalised)
 }

@@ -1,29 +1,44 @@
 //! Meshes of a glTF file as triangles.
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::material::{AlphaMode, Material};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
+use serde::Deserialize;
 
-use super::file::{File, component};
+use super::file::{File, component, normalised};
 use crate::input::Result;
 use crate::scene::SurfaceKind;
-use crate::scene::surface::own_points;
-use crate::shown::shortened;
+use crate::scene::surface::{BOX, own_points};
 
-/// The triangles of a mesh, or why it has none that can be read.
-pub type Mesh = Result<Triangles, String>;
-
+/// The drawn parts of a mesh.
 #[derive(Default)]
-pub struct Triangles {
+pub struct Mesh {
     pub points: Vec<DVec3>,
     pub corners: Vec<[u32; 3]>,
     /// Kind of each triangle, by the material of its primitive.
     pub kinds: Vec<SurfaceKind>,
     /// Sides of each triangle, alike.
     pub two_sided: Vec<bool>,
+    /// Single points and those of lines, which are in the box alone.
+    pub loose: Vec<DVec3>,
+    /// `true` if triangles were read, not only boxes of bounds.
+    pub has_own: bool,
+    /// Why some of it has no triangles.
+    pub reason: Option<String>,
+}
+
+impl Mesh {
+    fn push(&mut self, points: &[DVec3], corners: &[[u32; 3]], kind: SurfaceKind, two_sided: bool) {
+        let first = self.points.len() as u32;
+        self.points.extend(points);
+        let shift = |c: &[u32; 3]| c.map(|corner| first.saturating_add(corner));
+        self.corners.extend(corners.iter().map(shift));
+        self.kinds.resize(self.corners.len(), kind);
+        self.two_sided.resize(self.corners.len(), two_sided);
+    }
 }
 
 /// Returns false for a mask that is opaque everywhere.
@@ -37,6 +52,19 @@ fn has_holes(material: &Material, primitive: &Primitive) -> bool {
         || own.base_color_factor.0[3] < cutoff.0
         || primitive.attributes.contains_key(&colours)
         || extension(material, "KHR_materials_pbrSpecularGlossiness").is_some()
+}
+
+/// Effect of the triangles of a primitive on a ray.
+fn kind_of(material: &Material, primitive: &Primitive) -> SurfaceKind {
+    let transmission = extension(material, "KHR_materials_transmission");
+    // The factor's default is 0: opaque.
+    let factor = transmission.and_then(|t| t["transmissionFactor"].as_f64());
+    match material.alpha_mode {
+        _ if factor.is_some_and(|factor| factor > 0.0) => SurfaceKind::Clear,
+        Checked::Valid(AlphaMode::Blend) => SurfaceKind::Clear,
+        Checked::Valid(AlphaMode::Mask) if has_holes(material, primitive) => SurfaceKind::CutOut,
+        _ => SurfaceKind::Opaque,
+    }
 }
 
 fn extension<'m>(material: &'m Material, name: &str) -> Option<&'m Value> {
@@ -60,64 +88,66 @@ impl File<'_> {
     }
 
     pub fn mesh(&self, index: usize) -> Result<Mesh> {
-        let mesh = &self.root.meshes[index];
-        let mut all = Ok(Triangles::default());
-        for (place, primitive) in mesh.primitives.iter().enumerate() {
+        let primitives = self.root.meshes[index].primitives.iter().enumerate();
+        let drawn = primitives.filter_map(|(i, own)| Some((i, own, positions(own)?)));
+        let mut all = Mesh::default();
+        for (place, primitive, positions) in drawn.clone() {
             let place = format!("meshes[{index}].primitives[{place}]");
-            let Some(positions) = positions(primitive) else {
-                continue;
-            };
-            let (mut kind, mut two_sided) = (SurfaceKind::Opaque, false);
-            if let Some(material) = primitive.material {
-                let material = self.get(&self.root.materials, material, &place)?;
-                two_sided = material.double_sided;
-                let transmission = extension(material, "KHR_materials_transmission");
-                // The factor's default is 0: opaque.
-                let factor = transmission.and_then(|t| t["transmissionFactor"].as_f64());
-                let is_glass = factor.is_some_and(|factor| factor > 0.0);
-                match material.alpha_mode {
-                    _ if is_glass => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Blend) => kind = SurfaceKind::Clear,
-                    Checked::Valid(AlphaMode::Mask) if has_holes(material, primitive) => {
-                        kind = SurfaceKind::CutOut;
-                    }
-                    _ => {}
-                }
-            }
-            let own = self.primitive(primitive, positions, &place)?;
-            match (&mut all, own) {
-                (Ok(all), Ok(own)) => {
-                    let first = all.points.len() as u32;
-                    all.points.extend(own.points);
-                    let shift = |c: [u32; 3]| c.map(|corner| first.saturating_add(corner));
-                    all.corners.extend(own.corners.into_iter().map(shift));
-                    all.kinds.resize(all.corners.len(), kind);
-                    all.two_sided.resize(all.corners.len(), two_sided);
-                }
-                (Ok(_), Err(reason)) => all = Err(reason),
-                _ => {}
+            let accessor = self.get(&self.root.accessors, positions, &place)?;
+            let names = primitive.extensions.iter().flat_map(|e| e.others.keys());
+            let names = names.filter(|name| name.contains("compression"));
+            let unread = self.compressed(names, accessor.buffer_view.is_some());
+            let mut all_of = [Some(positions), primitive.indices].into_iter().flatten();
+            match unread.or_else(|| all_of.find_map(|index| self.unread(index))) {
+                Some(reason) => self.push_box(&mut all, positions, &reason)?,
+                None => self.primitive(&mut all, primitive, positions, &place)?,
             }
         }
-        Ok(all.and_then(|mut all| {
-            // Each item would have a copy of points without a triangle.
-            all.points = own_points(&all.points, &mut all.corners);
-            let has_any = !all.corners.is_empty();
-            has_any.then_some(all).ok_or("has no triangles".to_owned())
-        }))
+        if all.corners.is_empty() && all.loose.is_empty() {
+            for (.., positions) in drawn {
+                self.push_box(&mut all, positions, "has no triangles")?;
+            }
+        }
+        // Each item would have a copy of points without a triangle.
+        all.points = own_points(&all.points, &mut all.corners);
+        Ok(all)
+    }
+
+    /// Appends the box of the bounds of positions, which is seen and hides nothing.
+    fn push_box(&self, all: &mut Mesh, positions: Index<Accessor>, reason: &str) -> Result<()> {
+        all.reason.get_or_insert_with(|| reason.to_owned());
+        let place = format!("accessors[{}]", positions.value());
+        let accessor = self.get(&self.root.accessors, positions, &place)?;
+        let corner = |value: &Option<Value>| -> Option<DVec3> {
+            let corner = <[f64; 3]>::deserialize(value.as_ref()?).ok()?;
+            let kind = component(accessor)?;
+            let corner = corner.map(|n| normalised(n, kind, accessor.normalized));
+            Some(corner.into())
+        };
+        let ends = corner(&accessor.min).zip(corner(&accessor.max));
+        let ends = ends.filter(|(min, max)| min.cmple(*max).all());
+        let (min, max) = ends.ok_or_else(|| {
+            let expected = "min <= max of three numbers each";
+            self.error(place, "no bounds of positions", expected)
+        })?;
+        let corners: [DVec3; 8] = std::array::from_fn(|i| {
+            DVec3::select(BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0), min, max)
+        });
+        all.push(&corners, &BOX, SurfaceKind::CutOut, false);
+        Ok(())
     }
 
     /// Refuses indices that are no whole numbers.
     fn check_indices(&self, index: Index<Accessor>) -> Result<()> {
         use ComponentType::{U8, U16, U32};
         let accessor = &self.root.accessors[index.value()];
-        let kind = component(accessor).filter(|_| !accessor.normalized);
-        if matches!(kind, Some(U8 | U16 | U32)) {
-            return Ok(());
-        }
-        let number = component(accessor).map_or(0, ComponentType::as_gl_enum);
-        let found = match accessor.normalized {
-            true => "normalized indices".to_owned(),
-            false => format!("indices of type {number}"),
+        let found = match component(accessor) {
+            _ if accessor.normalized => "normalized indices".to_owned(),
+            Some(U8 | U16 | U32) => return Ok(()),
+            other => {
+                let number = other.map_or(0, ComponentType::as_gl_enum);
+                format!("indices of type {number}")
+            }
         };
         let expected = "5121, 5123 or 5125, not normalized";
         Err(self.error(format!("accessors[{}]", index.value()), found, expected))
@@ -125,28 +155,25 @@ impl File<'_> {
 
     fn primitive(
         &self,
+        all: &mut Mesh,
         primitive: &Primitive,
         positions: Index<Accessor>,
         place: &str,
-    ) -> Result<Mesh> {
-        let extensions = primitive.extensions.as_ref();
-        let mut names = extensions.into_iter().flat_map(|e| e.others.keys());
-        if let Some(name) = names.find(|name| name.contains("compression")) {
-            return Ok(Err(format!("is compressed ({})", shortened(name, 40))));
-        }
-        let points: Vec<DVec3> = match self.values(positions, 3, place)? {
-            Ok(values) => values.chunks_exact(3).map(DVec3::from_slice).collect(),
-            Err(reason) => return Ok(Err(reason)),
-        };
+    ) -> Result<()> {
+        let material = primitive.material;
+        let material = material.map(|index| self.get(&self.root.materials, index, place));
+        let material = material.transpose()?;
+        let kind = material.map_or(SurfaceKind::Opaque, |own| kind_of(own, primitive));
+        let two_sided = material.is_some_and(|own| own.double_sided);
+        let points = self.values(positions, 3, place)?;
+        let points: Vec<DVec3> = points.chunks_exact(3).map(DVec3::from_slice).collect();
         let order: Vec<u32> = match primitive.indices {
             None => (0..points.len() as u32).collect(),
-            Some(indices) => match self.values(indices, 1, place)? {
-                Ok(values) => {
-                    self.check_indices(indices)?;
-                    values.into_iter().map(|v| v as u32).collect()
-                }
-                Err(reason) => return Ok(Err(reason)),
-            },
+            Some(indices) => {
+                let values = self.values(indices, 1, place)?;
+                self.check_indices(indices)?;
+                values.into_iter().map(|v| v as u32).collect()
+            }
         };
         if let Some(&index) = order.iter().find(|&&index| index as usize >= points.len()) {
             self.get(&points, Index::new(index), &format!("{place}.indices"))?;
@@ -167,16 +194,19 @@ impl File<'_> {
                 let rim = order.get(1..).unwrap_or_default().windows(2);
                 rim.map(|c| [order[0], c[0], c[1]]).collect()
             }
-            Checked::Valid(_) => return Ok(Err("has points or lines".to_owned())),
+            Checked::Valid(_) => {
+                let reason = || "has points or lines".to_owned();
+                all.reason.get_or_insert_with(reason);
+                all.loose.extend(order.iter().map(|&i| points[i as usize]));
+                return Ok(());
+            }
             Checked::Invalid => {
                 return Err(self.error(place, "an unknown mode", "a mode of 0 to 6"));
             }
         };
-        Ok(Ok(Triangles {
-            points,
-            corners,
-            ..Triangles::default()
-        }))
+        all.has_own |= !corners.is_empty();
+        all.push(&points, &corners, kind, two_sided);
+        Ok(())
     }
 }
 

@@ -1,10 +1,10 @@
 //! glTF 2.0 and GLB: every node with a mesh is an item.
 //!
-//! Coordinates are the file's own. Triangles are read where all meshes have plain ones.
-//! Meshes that are compressed or sparse, points and lines have the boxes of their accessors'
-//! bounds instead, and then no item of the file has triangles. Vertices stand as they are
-//! stored, moved by their node alone: joints of skins and weights of morph targets change
-//! nothing. Source: Khronos Group, glTF 2.0 Specification, 2021.
+//! Coordinates are the file's own. Points and lines are in the boxes of their items and have
+//! no triangles. What is compressed has those of the box of its accessor's bounds, which is
+//! seen and hides nothing; in a file without other triangles, items are boxes. Vertices stand
+//! as they are stored, moved by their node alone: joints of skins and weights of morph targets
+//! change nothing. Source: Khronos Group, glTF 2.0 Specification, 2021.
 
 mod animation;
 mod file;
@@ -14,20 +14,19 @@ mod notes;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use glam::{BVec3, DAffine3, DVec3, DVec4};
-use gltf::json::{Index, Value};
-use serde::Deserialize;
+use glam::{DAffine3, DVec3, DVec4};
+use gltf::json::{Index, Node, Value};
 use serde_json::Map;
 
 pub use self::animation::CameraAnimation;
 use self::animation::{Parts, place_of, transform};
+use self::file::File;
 pub use self::file::{Beside, beside};
-use self::file::{File, component, normalised};
-use self::mesh::{Mesh, Triangles, positions};
+use self::mesh::{Mesh, positions};
 use super::{
     CameraPlace, Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origin, memory,
 };
-use crate::input::{Result, note};
+use crate::input::Result;
 
 /// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
@@ -65,29 +64,17 @@ pub(super) fn read_beside(
     memory::check_fits(name, needed, options.structures, numbers)?;
     let meshes = meshes.map(|mesh| file.mesh(mesh));
     let meshes: Vec<Mesh> = meshes.collect::<Result<_>>()?;
+    file.note_without_triangles(&placed, &meshes);
     let mut labels = Labels::new("name");
     let names = placed.iter().map(|item| &file.root.nodes[item.node].name);
     names.for_each(|name| labels.push(name.as_deref().unwrap_or_default()));
-    let reason = |mesh: usize| Some((mesh, meshes[mesh].as_ref().err()?));
-    let unplain = placed.iter().find_map(|item| reason(item.mesh));
-    let scene = match unplain {
-        None if placed.is_empty() => Scene::from_boxes(name, &[])?,
-        None => file.triangles(&placed, &meshes, name, options)?,
-        Some((mesh, reason)) => {
-            let boxes: Result<Vec<_>, _> = placed.iter().map(|i| file.bounds(i)).collect();
-            let scene = Scene::from_boxes(name, &boxes?)?;
-            let what = format!("items are boxes without triangles: meshes[{mesh}] {reason}");
-            note(&format!("{}: {what}", file.name));
-            scene
-        }
-    };
     Ok(Scene {
         up: UpAxis::Y,
         unit: Some("m"),
         labels: vec![labels],
         places,
         animation: animation.map(Arc::new),
-        ..scene
+        ..file.scene(&placed, &meshes, name, options)?
     })
 }
 
@@ -106,24 +93,26 @@ impl File<'_> {
     fn placed(&self) -> Result<(Vec<Placed>, Vec<CameraPlace>, Order)> {
         let nodes = &self.root.nodes;
         let first = (!self.root.scenes.is_empty()).then(|| Index::new(0));
-        let roots: Vec<usize> = match self.root.scene.or(first) {
-            Some(scene) => {
-                let scene = self.get(&self.root.scenes, scene, "scene")?;
-                scene.nodes.iter().map(|node| node.value()).collect()
-            }
+        let roots: Vec<Index<Node>> = match self.root.scene.or(first) {
+            Some(scene) => self.get(&self.root.scenes, scene, "scene")?.nodes.clone(),
             None => {
                 let children = nodes.iter().flat_map(|node| node.children.iter().flatten());
-                let inner: HashSet<usize> = children.map(|child| child.value()).collect();
-                (0..nodes.len()).filter(|n| !inner.contains(n)).collect()
+                let inner: HashSet<u32> = children.map(|child| child.value() as u32).collect();
+                let outer = (0..nodes.len() as u32).filter(|n| !inner.contains(n));
+                outer.map(Index::new).collect()
             }
         };
         let (mut placed, mut places, mut order) = (Vec::new(), Vec::new(), Vec::new());
         let mut reached = vec![false; nodes.len()];
-        let roots = roots.into_iter().rev();
-        let mut open: Vec<_> = roots.map(|r| (r, None, DAffine3::IDENTITY)).collect();
-        while let Some((index, above, parent)) = open.pop() {
+        let mut open = vec![(roots.iter(), None, DAffine3::IDENTITY)];
+        while let Some((rest, above, parent)) = open.last_mut() {
+            let Some(&next) = rest.next() else {
+                open.pop();
+                continue;
+            };
+            let (index, above, parent) = (next.value(), *above, *parent);
             let place = format!("nodes[{index}]");
-            let node = self.get(nodes, Index::new(index as u32), &place)?;
+            let node = self.get(nodes, next, &place)?;
             if std::mem::replace(&mut reached[index], true) {
                 return Err(self.error(place, "a node that is reached twice", "a tree of nodes"));
             }
@@ -145,8 +134,9 @@ impl File<'_> {
             if node.camera.is_some() {
                 places.extend(place_of(world, self.lens_of(index)?));
             }
-            let children = node.children.iter().flatten().rev();
-            open.extend(children.map(|child| (child.value(), Some(index), world)));
+            if let Some(children) = &node.children {
+                open.push((children.iter(), Some(index), world));
+            }
         }
         Ok((placed, places, order))
     }
@@ -222,85 +212,61 @@ impl File<'_> {
         all.collect()
     }
 
-    /// The scene of all triangles.
-    fn triangles(
+    /// The scene of all boxes, and of triangles if any are read.
+    fn scene(
         &self,
         placed: &[Placed],
         meshes: &[Mesh],
         name: &str,
         options: &LoadOptions,
     ) -> Result<Scene> {
-        let plain = |item: &Placed| meshes[item.mesh].as_ref().expect("plain meshes");
-        let count = |of: fn(&Triangles) -> usize| placed.iter().map(|i| of(plain(i)) as u64).sum();
-        let (triangles, points): (u64, u64) =
-            (count(|t| t.corners.len()), count(|t| t.points.len()));
-        options.check_fits(name, None, triangles.max(points))?;
-        if triangles.max(points) > u64::from(u32::MAX) / 4 {
-            let found = format!("{triangles} triangles");
+        let of = |item: &Placed| &meshes[item.mesh];
+        let parts = |mesh: &Mesh| mesh.corners.len().max(mesh.points.len() + mesh.loose.len());
+        let parts: u64 = placed.iter().map(|item| parts(of(item)) as u64).sum();
+        options.check_fits(name, None, parts)?;
+        if parts > u64::from(u32::MAX) / 4 {
+            let found = format!("{parts} triangles or points");
             return Err(self.error("meshes", found, "at most a billion"));
         }
-        let world = |item: &Placed| -> Vec<DVec3> {
-            let points = plain(item).points.iter();
-            points.map(|&p| item.world.transform_point3(p)).collect()
+        let bounds = |item: &Placed| -> Result<WorldBox> {
+            let points = self.moved(&of(item).points, item)?;
+            let corners = of(item).corners.iter().flatten();
+            let corners = corners.map(|&corner| points[corner as usize]);
+            let loose = self.moved(&of(item).loose, item)?;
+            Ok(WorldBox::union_of(corners.chain(loose).map(WorldBox::at)))
         };
-        let corners = placed.iter().flat_map(|item| {
-            let (points, corners) = (world(item), plain(item).corners.iter().flatten());
-            corners.map(move |&corner| WorldBox::at(points[corner as usize]))
-        });
-        let mut surfaces = Surfaces::about(choose_origin(corners));
+        let boxes: Vec<WorldBox> = placed.iter().map(bounds).collect::<Result<_>>()?;
+        let origin = choose_origin(boxes.iter().copied());
+        let scene = Scene::about(name, &boxes, origin)?;
+        if !placed.iter().any(|item| of(item).has_own) {
+            return Ok(scene);
+        }
+        let mut surfaces = Surfaces::about(origin);
         for item in placed {
-            let mesh = plain(item);
+            let mesh = of(item);
             let mut corners = mesh.corners.clone();
             if item.world.matrix3.determinant() < 0.0 {
                 corners.iter_mut().for_each(|corners| corners.swap(1, 2));
             }
-            let points = world(item);
-            for &point in &points {
-                self.within(point, item)?;
-            }
-            surfaces.push_written(&points, &corners);
+            surfaces.push_written(&self.moved(&mesh.points, item)?, &corners);
             surfaces.set_last(&mesh.kinds, &mesh.two_sided);
         }
-        surfaces.into_scene(name)
+        Ok(Scene {
+            surfaces: Some(Arc::new(surfaces)),
+            ..scene
+        })
     }
 
-    /// Checks that the transform of an item leaves a point among the finite numbers.
-    fn within(&self, point: DVec3, item: &Placed) -> Result<()> {
-        let place = || format!("meshes[{}]", item.mesh);
-        let found = || format!("a vertex that its transforms move to {point}");
-        let error = || self.error(place(), found(), "finite numbers");
-        point.is_finite().then_some(()).ok_or_else(error)
-    }
-
-    /// World box of the bounds that the accessors of an item state.
-    fn bounds(&self, item: &Placed) -> Result<WorldBox> {
-        let mut all = WorldBox::union_of([]);
-        let primitives = self.root.meshes[item.mesh].primitives.iter();
-        for positions in primitives.filter_map(positions) {
-            let place = format!("meshes[{}]", item.mesh);
-            let accessor = self.get(&self.root.accessors, positions, &place)?;
-            let corner = |value: &Option<Value>| -> Option<DVec3> {
-                let corner = <[f64; 3]>::deserialize(value.as_ref()?).ok()?;
-                let kind = component(accessor)?;
-                let corner = corner.map(|n| normalised(n, kind, accessor.normalized));
-                Some(corner.into())
-            };
-            let ends = corner(&accessor.min).zip(corner(&accessor.max));
-            let ends = ends.filter(|(min, max)| min.cmple(*max).all());
-            let (min, max) = ends.ok_or_else(|| {
-                let place = format!("accessors[{}]", positions.value());
-                let expected = "min <= max of three numbers each";
-                self.error(place, "no bounds of positions", expected)
-            })?;
-            for i in 0..8 {
-                let is_low = BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
-                let corner = DVec3::select(is_low, min, max);
-                let corner = item.world.transform_point3(corner);
-                self.within(corner, item)?;
-                all = WorldBox::union_of([all, WorldBox::at(corner)]);
-            }
-        }
-        Ok(all)
+    /// Points of a mesh in the world, as one of its items has them.
+    fn moved(&self, points: &[DVec3], item: &Placed) -> Result<Vec<DVec3>> {
+        let moved = |&point: &DVec3| {
+            let point = item.world.transform_point3(point);
+            let place = || format!("meshes[{}]", item.mesh);
+            let found = || format!("a vertex that its transforms move to {point}");
+            let error = || self.error(place(), found(), "finite numbers");
+            point.is_finite().then_some(point).ok_or_else(error)
+        };
+        points.iter().map(moved).collect()
     }
 }
 

@@ -1,12 +1,13 @@
 //! Notes about what a glTF file has and this reader leaves out or draws otherwise.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use super::animation::part;
 use super::file::File;
+use super::mesh::Mesh;
 use super::{Order, Placed};
 use crate::input::{note, note_counted};
-use crate::shown::{first_of, shortened};
+use crate::shown::{counted, first_of, shortened};
 
 /// Parts of names of extensions that need no note.
 ///
@@ -23,6 +24,26 @@ impl File<'_> {
             marked[node] = is_of_kind(node) || parent.is_some_and(|parent| marked[parent]);
         }
         marked
+    }
+
+    /// Tells of items that are boxes, or have parts that are.
+    pub fn note_without_triangles(&self, placed: &[Placed], meshes: &[Mesh]) {
+        let reason = |item: &Placed| Some((meshes[item.mesh].reason.as_ref()?, item.mesh));
+        let met = placed.iter().rev().filter_map(reason);
+        let count = counted(met.clone().count(), "item");
+        let what = match placed.iter().any(|item| meshes[item.mesh].has_own) {
+            true => &format!("{count} with parts without triangles, which hide nothing"),
+            false => "items are boxes without triangles",
+        };
+        // The first mesh of each reason.
+        let met: BTreeMap<&String, usize> = met.collect();
+        let met = met
+            .iter()
+            .map(|(reason, mesh)| format!("meshes[{mesh}] {reason}"));
+        let met: Vec<String> = met.collect();
+        if !met.is_empty() {
+            note(&format!("{}: {what}: {}", self.name, first_of(&met, 3)));
+        }
     }
 
     /// Tells of what is not read, or not as it is drawn; `cameras` have a direction.

@@ -395,32 +395,6 @@ fn unknown_chunks_of_a_glb_are_passed_over() {
 }
 
 #[test]
-fn compressed_meshes_and_points_have_the_boxes_of_their_bounds() {
-    let mut compressed = file();
-    let draco = json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}});
-    compressed["meshes"][0]["primitives"][0]["extensions"] = draco;
-    let mut points = file();
-    points["meshes"][0]["primitives"][0]["mode"] = json!(0);
-    let mut inverted = points.clone();
-    inverted["accessors"][0]["min"][0] = json!(9);
-    let error = read(&inverted).map(|_| ()).unwrap_err().to_string();
-    let wanted = "accessors[0]: no bounds of positions; expected min <= max";
-    assert!(error.contains(wanted), "{error}");
-    let whole = read(&file()).unwrap();
-    for file in [compressed, points] {
-        let scene = read(&file).unwrap();
-        assert!(scene.surfaces.is_none());
-        for item in 0..2 {
-            let all = scene.written().nth(item).unwrap();
-            let triangles = whole.written().nth(item).unwrap();
-            let margin = DVec3::splat(1e-12);
-            assert!(all.min.cmple(triangles.min + margin).all());
-            assert!(all.max.cmpge(triangles.max - margin).all());
-        }
-    }
-}
-
-#[test]
 fn instances_are_items() {
     let mut file = file();
     let mut instances = |attributes: Value| {
@@ -477,3 +451,4 @@ fn a_file_that_many_buffers_name_is_read_once() {
 
 mod damaged;
 mod materials;
+mod without_triangles;
