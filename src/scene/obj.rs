@@ -226,10 +226,10 @@ impl Obj<'_> {
         let corners = self.corners.iter().flatten();
         let corners = corners.map(|&corner| WorldBox::at(self.points[corner as usize]));
         let mut surfaces = Surfaces::about(choose_origin(corners));
-        let mut labels = Labels::new("name");
+        let (mut labels, mut places) = (Labels::new("name"), Vec::new());
         for pair in self.items.windows(2) {
             let triangles = &mut self.corners[pair[0].1..pair[1].1];
-            let points = own_points(&self.points, triangles);
+            let points = own_points(&self.points, triangles, &mut places);
             surfaces.push_written(&points, triangles);
             labels.push(&pair[0].0);
         }

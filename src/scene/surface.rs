@@ -332,16 +332,28 @@ impl Scene {
 
 /// The points of triangles, each once, in the order in which they occur.
 ///
-/// The triangles are then indices into them.
-pub(super) fn own_points(points: &[DVec3], triangles: &mut [[u32; 3]]) -> Vec<DVec3> {
-    let (mut places, mut own) = (HashMap::new(), Vec::new());
+/// The triangles are then indices into them. `places` may be any that another call left.
+pub(super) fn own_points(
+    points: &[DVec3],
+    triangles: &mut [[u32; 3]],
+    places: &mut Vec<u32>,
+) -> Vec<DVec3> {
+    const NONE: u32 = u32::MAX;
+    places.resize(points.len(), NONE);
+    let mut own = Vec::new();
     for corner in triangles.as_flattened_mut() {
-        *corner = *places.entry(*corner).or_insert_with(|| {
-            own.push(points[*corner as usize]);
-            own.len() as u32 - 1
-        });
+        let place = &mut places[*corner as usize];
+        if *place == NONE {
+            *place = own.len() as u32;
+            own.push(*corner);
+        }
+        *corner = *place;
     }
-    own
+    let point = |at: u32| {
+        places[at as usize] = NONE;
+        points[at as usize]
+    };
+    own.into_iter().map(point).collect()
 }
 
 /// Volume within a closed surface, cubic world units, rounded.

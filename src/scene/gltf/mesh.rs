@@ -109,7 +109,7 @@ impl File<'_> {
             }
         }
         // Each item would have a copy of points without a triangle.
-        all.points = own_points(&all.points, &mut all.corners);
+        all.points = own_points(&all.points, &mut all.corners, &mut Vec::new());
         Ok(all)
     }
 
