@@ -81,17 +81,13 @@ pub fn unpacked(
 
 /// Finds entries: that of the very name, or the last one that differs by case.
 pub fn finder<'e, 'r>(entries: &'e [Named<'r>]) -> impl Fn(&str) -> Option<&'e Named<'r>> {
-    let pairs = |entry: &'e Named<'r>| (&entry.0[..], entry);
-    let exact: HashMap<&str, _> = entries.iter().map(pairs).collect();
-    let folded = entries
-        .iter()
-        .map(|entry| (entry.0.to_ascii_lowercase(), entry));
-    let folded: HashMap<String, _> = folded.collect();
+    let keyed = |key: fn(&str) -> String| -> HashMap<String, &'e Named<'r>> {
+        entries.iter().map(|entry| (key(&entry.0), entry)).collect()
+    };
+    let (exact, folded) = (keyed(str::to_owned), keyed(str::to_ascii_lowercase));
     move |name| {
-        let found = exact.get(name);
-        found
-            .or_else(|| folded.get(&name.to_ascii_lowercase()))
-            .copied()
+        let folded = || folded.get(&name.to_ascii_lowercase());
+        exact.get(name).or_else(folded).copied()
     }
 }
 
