@@ -18,7 +18,8 @@ use super::{Ending, expect_places, interrupt, load_scene, print_json, text, writ
 use crate::culling::Culling;
 use crate::geometry::Aabb;
 use crate::index::{Registry, Row, StructureSpec, verdicts};
-use crate::measure::{SceneInfo, input_of};
+use crate::input::warn;
+use crate::measure::{SceneInfo, Workload, input_of};
 use crate::path::{self, CameraFacts};
 use crate::query::Containment;
 use crate::report::write_atomically;
@@ -27,9 +28,13 @@ use crate::scene::{Regions, Scene, UpAxis, write_boxes_csv};
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.lens.scene_args.options(1))?;
     let defaults = args.lens.defaults()?.of_scene(&scene);
-    let path = args.path.as_ref();
-    let path = path.map(|path| path::load(path, &scene, &defaults));
-    let cameras = path.transpose()?.map_or(Vec::new(), |path| path.cameras);
+    let load = |path: &String| path::load(path, &scene, &defaults);
+    let path = args.path.as_ref().map(load);
+    let path = path.transpose()?.unwrap_or_default();
+    // Of the default culling test; other numbers may hold one.
+    let refused = Workload::new(&scene, &path, &Culling::default()).err();
+    refused.iter().for_each(|error| warn(&error.to_string()));
+    let cameras = path.cameras;
     let facts = (!cameras.is_empty()).then(|| CameraFacts::of(&cameras, scene.up));
     let info = SceneInfo::of(&scene);
     let figures = SceneFacts::of(&scene)?;
@@ -40,11 +45,13 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     if args.format == TableFormat::Json {
         let mut value = serde_json::to_value(&info)?;
         if let (Some(facts), Some(path)) = (&facts, &args.path) {
+            let mut warnings = path::warnings(&scene, path, &cameras);
+            warnings.extend(refused.map(|error| error.to_string()));
             value["cameras"] = json!({
                 "name": path,
                 "camera_count": cameras.len(),
                 "lens": facts,
-                "warnings": path::warnings(&scene, path, &cameras),
+                "warnings": warnings,
             });
         }
         value["region_kind"] = json!(scene.regions.kind());

@@ -2,12 +2,13 @@
 //!
 //! Lenses, matrices and axes in words, which tables and pages show as well.
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::text;
 use crate::index::{Bvh, FrustumQuery, Input, RegionIndex};
 use crate::measure::SceneInfo;
-use crate::path::{CameraFacts, LensDefaults, MatrixFacts};
+use crate::path::{CameraFacts, LensDefaults, MatrixFacts, scattered};
 use crate::scene::{Scene, WorldBox};
 use crate::statistics::{quantile, sorted};
 
@@ -69,20 +70,18 @@ impl SceneFacts {
             [0.0, 0.5, 0.99, 1.0].map(|q| quantile(&edges, q));
         // A point is not thinner than it is long.
         let flat_counts = [0, 1, 2].map(|axis| {
-            let is_flat = |extent: &glam::DVec3| extent[axis] < FLAT * extent.max_element();
+            let is_flat = |extent: &DVec3| extent[axis] < FLAT * extent.max_element();
             extents().filter(is_flat).count()
         });
         let corners = |b: WorldBox| [b.min, b.max].map(|v| v.to_array().map(f64::to_bits));
         let mut distinct: Vec<_> = scene.written().map(corners).collect();
         distinct.sort_unstable();
         distinct.dedup();
-        let mut f32_loss = [0.0f64; 3];
+        let mut f32_loss = DVec3::ZERO;
         for (b, written) in scene.items.iter().zip(scene.written()) {
-            for (axis, loss) in f32_loss.iter_mut().enumerate() {
-                let low = written.min[axis] - scene.origin[axis] - f64::from(b.min[axis]);
-                let high = f64::from(b.max[axis]) - (written.max[axis] - scene.origin[axis]);
-                *loss = loss.max(low).max(high);
-            }
+            let low = written.min - scene.origin - b.min.as_dvec3();
+            let high = b.max.as_dvec3() - (written.max - scene.origin);
+            f32_loss = f32_loss.max(low).max(high);
         }
         let bounds = match scene.items.is_empty() {
             true => scene.world_bounds(),
@@ -98,18 +97,17 @@ impl SceneFacts {
             f64::from(low.next_up() - low)
         };
         let (mut sampled, mut meeting, mut others) = (0, 0, 0);
-        if !scene.items.is_empty() {
-            let tree = Bvh::build(&Input::new(&scene.items), &Default::default())?;
-            let stride = scene.items.len().div_ceil(SAMPLE);
-            for (stored, b) in scene.items.iter().zip(scene.written()).step_by(stride) {
-                let mut met = 0;
-                tree.each_visible(stored, |id| met += usize::from(scene.overlaps(id, &b)));
-                (sampled, others) = (sampled + 1, others + met - 1);
-                meeting += usize::from(met > 1);
-                if others > MOST_NEIGHBOURS {
-                    break;
-                }
+        let tree = Bvh::build(&Input::new(&scene.items), &Default::default())?;
+        for item in scattered(scene.items.len(), SAMPLE) {
+            let (mut met, b) = (0, scene.written_box(item));
+            let stored = &scene.items[item];
+            tree.each_visible(stored, |id| met += usize::from(scene.overlaps(id, &b)));
+            // One that ends the sample is no part of it: such an item is no random one.
+            if sampled > 0 && others + met > MOST_NEIGHBOURS {
+                break;
             }
+            (sampled, others) = (sampled + 1, others + met - 1);
+            meeting += usize::from(met > 1);
         }
         let of_sample = |count: usize| (sampled > 0).then(|| count as f64 / sampled as f64);
         Ok(SceneFacts {
@@ -128,7 +126,7 @@ impl SceneFacts {
             overlap_mean: of_sample(others),
             overlap_share: of_sample(meeting),
             overlap_sample_count: sampled,
-            f32_loss,
+            f32_loss: f32_loss.to_array(),
             f32_step_unmoved: [0, 1, 2].map(step),
         })
     }
@@ -161,15 +159,18 @@ impl SceneFacts {
             none if none.is_empty() => "no items thinner than 1 % of their longest edge".to_owned(),
             some => format!("{some} (below 1 % of the longest edge)"),
         };
-        let overlap = self.overlap_mean.zip(self.overlap_share);
-        let overlap = overlap.map(|(mean, share)| {
-            let sampled = Some(self.overlap_sample_count).filter(|sampled| *sampled < count);
-            let of = text::some(sampled, |sampled| {
-                format!(" (of {} sampled)", people(sampled))
-            });
-            let (share, mean) = (text::percent(share), text::short(mean));
-            format!("{share} meet other items, {mean} on average{of}")
-        });
+        let sampled = self.overlap_sample_count;
+        let overlap = [self.overlap_share, self.overlap_mean];
+        let [share, mean] = overlap.map(Option::unwrap_or_default);
+        let (all, others) = (text::percent(share), text::short(mean));
+        let mut overlap = format!("{all} meet other items, {others} on average");
+        if sampled < count {
+            // As many digits as items of the sample that meet others decide.
+            let digits = usize::from(share * sampled as f64 >= 100.0);
+            let [all, others] = [share * 100.0, mean].map(|x| text::short(rounded(x, digits)));
+            let of = format!("(of {} sampled)", people(sampled));
+            overlap = format!("about {all} % meet other items, {others} on average {of}");
+        }
         let copies = match self.coincident_count {
             0 => "no two items have the same bounds".to_owned(),
             copies => format!("{} with the bounds of an item before them", people(copies)),
@@ -180,9 +181,8 @@ impl SceneFacts {
         );
         let mut rows = vec![extent, ("sizes", sizes)];
         rows.extend(self.bars(length).map(|bars| ("", bars)));
-        rows.push(("flat", flat));
-        rows.extend(overlap.map(|overlap| ("overlap", overlap)));
-        rows.extend([("copies", copies), ("f32", loss)]);
+        let more = [("flat", flat), ("overlap", overlap), ("copies", copies)];
+        rows.extend(more.into_iter().chain([("f32", loss)]));
         rows
     }
 
@@ -271,17 +271,13 @@ pub fn lens(facts: &CameraFacts) -> String {
     let of = |before: &str, range: Option<[f64; 2]>, after: &str| {
         range.map(|range| format!("{before}{}{after}", shown(range)))
     };
-    let far = match facts.far {
-        [Some(least), Some(most)] => shown([least, most]),
-        [Some(least), None] => format!("{} to infinite", figure(least)),
-        _ => "infinite".to_owned(),
-    };
+    let far = facts.far.map(|far| far.unwrap_or(f64::INFINITY));
     let parts = [
         of("", facts.fovy_deg, " degrees"),
         of("height ", facts.ortho_height, ""),
         of("aspect ", facts.aspect, ""),
         of("near ", facts.near, ""),
-        Some(format!("far {far}")),
+        Some(format!("far {}", shown(far)).replace("inf", "infinite")),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
@@ -324,18 +320,22 @@ fn shown([least, most]: [f64; 2]) -> String {
 fn figure(value: f64) -> String {
     // No lens has 180 degrees.
     let digits = [3, 6][usize::from((179.9..180.0).contains(&value))];
-    let rounded = format!("{value:.digits$e}").parse().unwrap_or(value) + 0.0;
+    let rounded = rounded(value, digits);
     match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
         true => rounded.to_string(),
         false => format!("{rounded:e}"),
     }
 }
 
+/// Some digits after the first; -0 is 0.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.digits$e}").parse().unwrap_or(value) + 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{WorldBox, load};
-    use glam::DVec3;
 
     fn scene(boxes: &[[f64; 2]]) -> Scene {
         let one = |&[low, size]: &[f64; 2]| {
@@ -423,6 +423,35 @@ mod tests {
                 counted == above_zero || counted == 0 && above_zero < 2,
                 "{source}"
             );
+        }
+    }
+
+    /// Every other item meets another one, or the first quarter lies in one pile.
+    #[test]
+    fn neighbours_are_counted_of_items_from_anywhere() {
+        let alone = |item: usize| [1e6 + 9.0 * item as f64, 1.0];
+        let pairs = |first: usize| {
+            let place = move |item: usize| match item % 2 == first {
+                true => [3.0 * (item / 4) as f64, 1.0],
+                false => alone(item),
+            };
+            scene(&(0..4000).map(place).collect::<Vec<_>>())
+        };
+        let piled = |item| if item < 16_000 { [0.0; 2] } else { alone(item) };
+        let piled = scene(&(0..64_000).map(piled).collect::<Vec<_>>());
+        for (scene, share, others) in [
+            (pairs(0), 0.5, 1.0),
+            (pairs(1), 0.5, 1.0),
+            (piled, 0.25, 15_999.0),
+        ] {
+            let facts = SceneFacts::of(&scene).unwrap();
+            let (found, mean) = (facts.overlap_share.unwrap(), facts.overlap_mean.unwrap());
+            assert!((found - share).abs() < 0.05, "{found} of {share}");
+            assert!((mean / others / found - 1.0).abs() < 1e-9, "{mean}");
+            let rows = facts.rows(&scene);
+            let (_, text) = rows.iter().find(|row| row.0 == "overlap").unwrap();
+            let told = format!("about {} % meet other items", (found * 100.0).round());
+            assert!(text.starts_with(&told), "{text}");
         }
     }
 

@@ -47,11 +47,11 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let started = Instant::now();
     // A smaller check of every other instruction set of this machine.
     let chosen = args.kernel.execution()?.kernel;
-    let all_kernels = args.kernel.name.is_none();
-    let others = || Kernel::available().filter(|&kernel| all_kernels && kernel != chosen);
+    let is_other = |kernel: &Kernel| args.kernel.name.is_none() && *kernel != chosen;
     let mut sections = Vec::new();
-    let mut by_others = 0;
-    let passes = others().map(|kernel| (kernel, cases.min(OF_OTHERS)));
+    let (mut by_others, mut names) = (0, Vec::new());
+    let passes = Kernel::available().filter(is_other);
+    let passes = passes.map(|kernel| (kernel, cases.min(OF_OTHERS)));
     let passes: Vec<(Kernel, u64)> = passes.chain([(chosen, cases)]).collect();
     let vector_passes = (vectors.len() * passes.len()) as u64;
     let case_passes: u64 = passes.iter().map(|pass| extremes::total(pass.1)).sum();
@@ -92,30 +92,29 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         }
         if kernel != chosen {
             let rows = |section: &Section| section.rows.len();
-            by_others += found.iter().map(rows).sum::<usize>();
+            let all: usize = found.iter().map(rows).sum();
+            names.extend((all > 0).then(|| kernel.name()));
             found = failures(found, kernel);
-            by_others -= found.iter().map(rows).sum::<usize>();
+            by_others += all - found.iter().map(rows).sum::<usize>();
         }
         sections.extend(found);
     }
     bar.finish_and_clear();
-    let has_rows = sections.iter().any(|section| !section.rows.is_empty());
-    if !interrupt::heard() && by_others == 0 && !has_rows {
+    let rows: Vec<&Row> = sections.iter().flat_map(|section| &section.rows).collect();
+    if !interrupt::heard() && by_others == 0 && rows.is_empty() {
         let files = args.vectors.iter().map(|file| file.display().to_string());
         let files = text::joined(files);
         bail!("{files}: nothing to check; expected planes, a camera or points in a vector");
     }
-    let rows: Vec<&Row> = sections.iter().flat_map(|section| &section.rows).collect();
     print(args.format, &rows, || {
-        let names: Vec<&str> = others().map(Kernel::name).collect();
-        let note = match by_others {
+        let mut note = match by_others {
             0 => String::new(),
             count => format!("; {} more by {}", text::count(count), names.join(" and ")),
         };
+        note += ["", "; interrupted: others were left out"][usize::from(interrupt::heard())];
         table(&sections, started.elapsed().as_secs_f64(), &note)
     })?;
-    let has_failed = |section: &Section| section.count(Status::Fail) > 0;
-    let is_right = !sections.iter().any(has_failed);
+    let is_right = rows.iter().all(|row| row.status != Status::Fail);
     Ok(Ending::of(is_right))
 }
 

@@ -1,10 +1,10 @@
 //! Search for the far plane at which a given share of a sample is visible.
 
-use super::unfit;
+use super::{scattered, unfit};
 use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions};
 use crate::geometry::Aabb;
 use crate::input::Result;
-use crate::scene::{Scene, mix64};
+use crate::scene::Scene;
 use crate::shown::significant;
 
 /// Maximum numbers of items and cameras sampled per step of the search.
@@ -68,10 +68,10 @@ pub(super) fn for_visible_share(
         }
         Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
     };
-    let unreached = |found: &str, wanted: &str| {
+    let unreached = |found: &str, expected: &str| {
         let scene = &scene.name;
         let reason =
-            format!("six planes return {found} of '{scene}' along it; expected a {wanted} share");
+            format!("six planes return {found} of '{scene}' along it; expected {expected}");
         unfit(path, reason)
     };
     let search = |items: &[Aabb]| {
@@ -86,7 +86,8 @@ pub(super) fn for_visible_share(
         }
         if most < share {
             let found = format!("at most {}%", significant(largest * 100.0));
-            return Err(unreached(&found, "smaller"));
+            let expected = ["a path that sees items", "a smaller share"];
+            return Err(unreached(&found, expected[usize::from(largest > 0.0)]));
         }
         let mut reached = [visible(items, low)?, most];
         for _ in 0..16 {
@@ -104,7 +105,7 @@ pub(super) fn for_visible_share(
                 true => format!("{below}% or {above}%, and no share between,"),
                 false => format!("at least {above}%"),
             };
-            return Err(unreached(&found, "larger"));
+            return Err(unreached(&found, "a larger share"));
         }
         Ok(high)
     };
@@ -113,21 +114,13 @@ pub(super) fn for_visible_share(
         return found;
     }
     // Files that repeat themselves may have one kind of item at every n-th place.
-    let scattered = scattered(&scene.items, regular.len());
+    let scattered = scattered(scene.items.len(), regular.len());
+    let scattered: Vec<Aabb> = scattered.map(|item| scene.items[item]).collect();
     let share_of = |scale: &f64| visible(&scattered, *scale).ok();
     match found.as_ref().ok().and_then(share_of) {
         Some(seen) if (share / MOST_APART..=share * MOST_APART).contains(&seen) => found,
         _ => search(&scattered),
     }
-}
-
-/// `count` of the items, each from a hashed place in an equal part of them.
-fn scattered(items: &[Aabb], count: usize) -> Vec<Aabb> {
-    let place = |part: usize| {
-        let [begin, end] = [part, part + 1].map(|part| part * items.len() / count);
-        items[begin + mix64(part as u64) as usize % (end - begin)]
-    };
-    (0..count).map(place).collect()
 }
 
 /// Most cameras of a sample with that many items.

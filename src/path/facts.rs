@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibrate::{MOST_TESTS, every_nth};
 use super::{CameraPath, LensDefaults};
-use crate::camera::{Camera, FARTHEST, Frame, Lens, LensKind, PlaneOptions, ViewProjection};
+use crate::camera::{Camera, FARTHEST, Lens, LensKind, PlaneOptions, ViewProjection};
 use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::{counted, significant};
@@ -58,34 +58,41 @@ pub struct MatrixFacts {
 impl CameraFacts {
     /// Facts of the cameras of a path, in a scene with an up axis.
     pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
-        // Of a matrix without a lens the matrix itself.
-        let lenses = cameras.iter().map(|camera| {
+        let one = |camera: &Camera| {
+            // Of a matrix without a lens the matrix itself.
             let found = camera.lens.matrix().and_then(|m| m.unprojected().ok());
-            found.map_or(camera.lens, |found| found.camera.lens)
-        });
-        let lenses: Vec<Lens> = lenses.collect();
-        let all = |of: &dyn Fn(&Lens) -> Option<f64>| range(lenses.iter().filter_map(of));
-        let fars = all(&|lens| Some(lens.far().unwrap_or(f64::INFINITY)));
+            let lens = found.map_or(camera.lens, |found| found.camera.lens);
+            let height = lens.height_at(1.0).filter(|_| lens.is_orthographic());
+            let [fovy_deg, aspect] = shape(&lens);
+            let values = [fovy_deg, height, aspect, Some(lens.near())];
+            let [fovy_deg, ortho_height, aspect, near] = values.map(|v| v.map(|v| [v; 2]));
+            CameraFacts {
+                fovy_deg,
+                ortho_height,
+                aspect,
+                near,
+                far: [lens.far(); 2],
+                matrix: None,
+            }
+        };
+        let all = cameras.iter().map(one).reduce(CameraFacts::with);
         CameraFacts {
-            fovy_deg: all(&fovy_deg),
-            ortho_height: all(&|lens| lens.height_at(1.0).filter(|_| lens.is_orthographic())),
-            aspect: all(&aspect),
-            near: all(&|lens| Some(lens.near())),
-            far: finite(fars),
             matrix: MatrixFacts::of(cameras, up),
+            ..all.unwrap_or_default()
         }
     }
 
     /// The facts of both; matrices of the first.
     pub fn with(self, other: CameraFacts) -> CameraFacts {
-        let both = |a, b| range([a, b].into_iter().flatten().flatten());
-        let fars = self.far.into_iter().chain(other.far);
+        let range = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
+        let both = |a: Option<_>, b| a.into_iter().chain(b).reduce(range);
+        let [far, others] = [self.far, other.far].map(|f| f.map(|f| f.unwrap_or(f64::INFINITY)));
         CameraFacts {
             fovy_deg: both(self.fovy_deg, other.fovy_deg),
             ortho_height: both(self.ortho_height, other.ortho_height),
             aspect: both(self.aspect, other.aspect),
             near: both(self.near, other.near),
-            far: finite(range(fars.map(|far| far.unwrap_or(f64::INFINITY)))),
+            far: range(far, others).map(|far| Some(far).filter(|far| far.is_finite())),
             matrix: self.matrix,
         }
     }
@@ -129,39 +136,18 @@ pub fn is_downward(cameras: &[Camera], up: UpAxis) -> bool {
     cameras.iter().filter_map(along).sum::<f64>() < 0.0
 }
 
-/// A range with `None` for what is infinite.
-fn finite(range: Option<[f64; 2]>) -> [Option<f64>; 2] {
-    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-    range.map_or([None; 2], |range| range.map(finite))
-}
-
-fn fovy_deg(lens: &Lens) -> Option<f64> {
+/// Vertical angle of view in degrees, and width / height.
+fn shape(lens: &Lens) -> [Option<f64>; 2] {
     match *lens.kind() {
-        LensKind::Perspective { fovy_deg, .. } => Some(fovy_deg),
-        LensKind::OffAxis { .. } => {
-            let [_, _, bottom, top] = lens.window();
-            Some((libm::atan(top) - libm::atan(bottom)).to_degrees())
+        LensKind::Perspective { fovy_deg, aspect } => [fovy_deg, aspect].map(Some),
+        LensKind::Orthographic { aspect, .. } => [None, Some(aspect)],
+        LensKind::OffAxis { window } => {
+            let ([left, right, low, high], [_, _, bottom, top]) = (window, lens.window());
+            let fovy = libm::atan(top) - libm::atan(bottom);
+            [fovy.to_degrees(), (right - left) / (high - low)].map(Some)
         }
-        _ => None,
+        LensKind::Matrix(_) => [None; 2],
     }
-}
-
-fn aspect(lens: &Lens) -> Option<f64> {
-    match *lens.kind() {
-        LensKind::Perspective { aspect, .. } | LensKind::Orthographic { aspect, .. } => {
-            Some(aspect)
-        }
-        LensKind::OffAxis {
-            window: [left, right, bottom, top],
-        } => Some((right - left) / (top - bottom)),
-        LensKind::Matrix(_) => None,
-    }
-}
-
-/// Least and largest of some values; `None` for none.
-fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    let ends = values.map(|value| [value; 2]);
-    ends.reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
 }
 
 /// Scene diagonals from the scene to an eye that is far outside.
@@ -170,17 +156,20 @@ const FAR_OUTSIDE: f64 = 3.0;
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
-    let doubts: [Doubt; 7] = [
+    const DOUBTS: [Doubt; 7] = [
         bare,
         rolled,
-        unstraight,
+        sheared,
         shallow,
         upward_parallel,
         far_outside,
         blind,
     ];
-    let found = doubts.iter().filter_map(|doubt| doubt(scene, cameras));
-    found.map(|doubt| format!("{path}: {doubt}")).collect()
+    let found = || DOUBTS.iter().filter_map(|doubt| doubt(scene, cameras));
+    // The axes and the eye of a matrix that is read wrongly are no camera's.
+    let found = transposed(cameras).map_or_else(|| found().collect(), |only| vec![only]);
+    let found = found.iter().map(|doubt| format!("{path}: {doubt}"));
+    found.collect()
 }
 
 impl LensDefaults {
@@ -189,8 +178,9 @@ impl LensDefaults {
         let names = ["--fovy", "--aspect", "--near", "--far"];
         let endless = |far: Option<f64>| far.unwrap_or(f64::INFINITY);
         let of = |lens: &Lens| {
-            let depths = [lens.near(), endless(lens.far())].map(Some);
-            [fovy_deg(lens), aspect(lens), depths[0], depths[1]]
+            let [fovy_deg, aspect] = shape(lens);
+            let [near, far] = [lens.near(), endless(lens.far())].map(Some);
+            [fovy_deg, aspect, near, far]
         };
         let far = self.far.map(|far| far.filter(|far| *far <= FARTHEST));
         let given = [self.fovy_deg, self.aspect, self.near, far.map(endless)];
@@ -247,54 +237,48 @@ fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
 fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let ups = cameras.iter().filter_map(|c| {
-        let ([across, along], image_up) = upward(scene.up, c)?;
+    let unlike = cameras.iter().filter_map(|camera| {
+        let found = camera.lens.matrix().map(ViewProjection::unprojected);
+        let found = found.transpose().ok()?;
+        let frame = found.map_or(camera.frame, |found| found.camera.frame);
+        let [across, along] = [frame.u(), frame.v()].map(|own| own.dot(scene.up.vector()));
+        // A mirrored image may have y downward.
+        let is_mirrored = found.is_some_and(|found| found.is_mirrored);
+        let along = if is_mirrored { along.abs() } else { along };
         // Straight up or down there is no roll.
         let is_level = across.hypot(along) > 0.1;
-        (is_level && along < across.abs()).then_some(image_up)
+        (!is_level || along < across.abs()).then_some((is_level, frame.v()))
     });
-    let ups: Vec<DVec3> = ups.collect();
-    let (first, own) = (ups.first()?, scene.up.name());
-    let what = share(ups.len(), cameras);
+    let unlike: Vec<(bool, DVec3)> = unlike.collect();
+    let rolled = || unlike.iter().filter(|(is_level, _)| *is_level);
+    let ((_, first), own) = (rolled().next()?, scene.up.name());
+    let along = |axis: UpAxis, up: &DVec3| up.dot(axis.vector()).abs();
     let is_along = |axis: &UpAxis| {
-        let along: f64 = ups.iter().map(|up| up.dot(axis.vector()).abs()).sum();
-        along > 0.7 * ups.len() as f64
+        let sum: f64 = rolled().map(|(_, up)| along(*axis, up)).sum();
+        sum > 0.7 * rolled().count() as f64
     };
     Some(match UpAxis::ALL.into_iter().find(is_along) {
         Some(other) if other != scene.up => {
-            let is_up = |c: &&Camera| {
-                upward(other, c).is_some_and(|([across, along], _)| across.abs() <= along.abs())
-            };
-            let what = share(cameras.iter().filter(is_up).count(), cameras);
-            let (other, name) = (other.name(), &scene.name);
+            let is_up = |(_, up): &&(bool, DVec3)| along(other, up) > 0.7;
+            let count = unlike.iter().filter(is_up).count();
+            let (what, other, name) = (share(count, cameras), other.name(), &scene.name);
             // Formats that state an axis state a unit as well.
-            let advice = match scene.unit {
-                None => format!("; --up {other} if it is the scene's"),
-                Some(_) => String::new(),
-            };
+            let is_advised = scene.unit.is_none() && 2 * count >= cameras.len();
+            let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
+            let advice = advice.unwrap_or_default();
             format!("{other} is up in {what}, {own} in {name}{advice}")
         }
-        _ => format!(
-            "{what} rolled by more than 45 degrees, first with ({:.3}, {:.3}, {:.3}) up; {own} is \
-             up in {}",
-            first.x, first.y, first.z, scene.name
-        ),
-    })
-}
-
-/// Parts of an axis along right and up in the image, and the vector up there.
-fn upward(axis: UpAxis, camera: &Camera) -> Option<([f64; 2], DVec3)> {
-    let (frame, is_mirrored): (Frame, bool) = match camera.lens.matrix() {
-        Some(matrix) => {
-            let found = matrix.unprojected().ok()?;
-            (found.camera.frame, found.is_mirrored)
+        _ => {
+            let what = share(rolled().count(), cameras);
+            // -0 is 0.
+            let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
+            format!(
+                "{what} rolled by more than 45 degrees, first with ({x:.3}, {y:.3}, {z:.3}) up; \
+                 {own} is up in {}",
+                scene.name
+            )
         }
-        None => (camera.frame, false),
-    };
-    let [across, along] = [frame.u(), frame.v()].map(|own| own.dot(axis.vector()));
-    // A mirrored image may have y downward.
-    let along = if is_mirrored { along.abs() } else { along };
-    Some(([across, along], frame.v()))
+    })
 }
 
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
@@ -314,24 +298,30 @@ fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// Matrices that are no camera's, and those whose transposes are.
-fn unstraight(_: &Scene, cameras: &[Camera]) -> Option<String> {
-    let matrices = cameras.iter().filter_map(|c| c.lens.matrix());
-    let matrices = matrices.filter(|matrix| matrix.is_sheared() == Some(true));
-    let matrices: Vec<&ViewProjection> = matrices.collect();
-    let first = matrices.first()?;
-    let what = share(matrices.len(), cameras);
-    let transposed = matrices.iter().filter_map(|matrix| matrix.transposed());
-    let is_straight = |matrix: &ViewProjection| matrix.is_sheared() == Some(false);
-    if transposed.filter(is_straight).count() == matrices.len() {
-        let convention = first.convention();
-        return Some(format!(
-            "{what} read as {} sheared, their transposes are not; --matrix-convention {} if they \
-             are transposed",
-            convention.name(),
-            convention.transposed().name()
-        ));
-    }
+/// The matrix of a camera, if it has no right angles as it is read.
+fn unstraight(camera: &Camera) -> Option<&ViewProjection> {
+    let matrix = camera.lens.matrix();
+    matrix.filter(|matrix| matrix.is_sheared() == Some(true))
+}
+
+/// Matrices that are no camera's, where all their transposes are.
+fn transposed(cameras: &[Camera]) -> Option<String> {
+    let convention = cameras.iter().find_map(unstraight)?.convention();
+    let is_straight = |matrix: ViewProjection| matrix.is_sheared() == Some(false);
+    let is_turned = |matrix: &ViewProjection| matrix.transposed().is_some_and(is_straight);
+    let are_all = cameras.iter().filter_map(unstraight).all(is_turned);
+    let what = share_of(cameras, |camera| are_all && unstraight(camera).is_some())?;
+    Some(format!(
+        "{what} read as {} sheared, their transposes are not; --matrix-convention {} if they are \
+         transposed",
+        convention.name(),
+        convention.transposed().name()
+    ))
+}
+
+/// Matrices that are no camera's.
+fn sheared(_: &Scene, cameras: &[Camera]) -> Option<String> {
+    let what = share_of(cameras, |camera| unstraight(camera).is_some())?;
     Some(format!(
         "{what} sheared, or with an oblique near plane: image axes or depths at no right angles"
     ))
@@ -345,7 +335,9 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let diagonal = if diagonal > 0.0 { diagonal } else { 2.0 };
     let outside = |camera: &Camera| {
         let eye = camera.frame.eye;
-        let distance = eye.distance(eye.clamp(bounds.min, bounds.max));
+        let away = eye - eye.clamp(bounds.min, bounds.max);
+        // Squares may be more than f64 holds.
+        let distance = away.to_array().into_iter().fold(0.0, libm::hypot);
         // Parallel lines of sight begin anywhere.
         (distance > FAR_OUTSIDE * diagonal && !camera.lens.is_orthographic())
             .then_some(distance / diagonal)

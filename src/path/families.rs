@@ -18,8 +18,8 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let radius = spec.number_between("radius", 0.6, 0.0, 1e6)? * stage.radius();
     let height = spec.number_between("height", 0.35, -1e6, 1e6)? * radius;
     let pose = |turn: f64| {
-        let angle = std::f64::consts::TAU * turn;
-        let arm = DVec3::new(libm::cos(angle) * radius, libm::sin(angle) * radius, height);
+        let arm = on_sphere(0.0, std::f64::consts::TAU * turn) * radius;
+        let arm = arm.with_z(height);
         Pose::new(stage.centre() + arm, -arm)
     };
     Ok(stage.turns().map(pose).collect())
@@ -102,8 +102,7 @@ pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
             ..Pose::new(from + forward * travelled, forward)
         }
     };
-    let last = stage.count.saturating_sub(1).max(1) as f64;
-    Ok((0..stage.count).map(|i| pose(i as f64 / last)).collect())
+    Ok(even_times([0.0, 1.0], stage.count).map(pose).collect())
 }
 
 /// Unrelated views: the eye jumps, so nothing of the last frame helps.

@@ -17,7 +17,7 @@ use glam::DVec3;
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
 use crate::input::{InputError, Result, names_file, read_file, warn};
-use crate::scene::{self, PlaceView, Scene, SeededRng, WorldBox, memory};
+use crate::scene::{self, PlaceView, Scene, SeededRng, WorldBox, memory, mix64};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
@@ -83,6 +83,19 @@ impl CameraPath {
 pub(crate) fn evenly(count: usize, most: usize) -> impl Iterator<Item = usize> + Clone {
     let chosen = count.min(most);
     (0..chosen).map(move |n| n * count / chosen)
+}
+
+/// At most `most` of `count` indices, from hashed places in equal parts.
+///
+/// The first of them are from all over, too.
+pub(crate) fn scattered(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let chosen = count.min(most);
+    (0..chosen as u64).map(move |n| {
+        // A prime, some 0.62 of 2^32.
+        let part = (n * 0x9E37_79B1 % chosen as u64) as usize;
+        let [begin, end] = [part, part + 1].map(|part| part * count / chosen);
+        begin + mix64(part as u64) as usize % (end - begin)
+    })
 }
 
 /// Keeps `most` of more.

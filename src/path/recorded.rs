@@ -218,6 +218,7 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
     let up = has_up.then_some(up).transpose()?;
     let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
     let [fovy, height, aspect, near, far] = lens.map(|name| table.column(name));
+    let by_scene = far.is_none() && defaults.far.is_none();
     Ok(Box::new(move |row| {
         let number = |column: Option<usize>, default: f64| {
             column.map_or(Ok(default), |column| row.finite_number(column))
@@ -228,11 +229,13 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         let far = match far.map(|column| row.text(column)) {
             Some("") => None,
             Some(text) => {
-                let far = text.parse::<f64>().ok();
-                let far = far.filter(|far| *far > f64::NEG_INFINITY);
-                let expected = "a number above 0, inf or nothing";
+                let far = text
+                    .parse()
+                    .ok()
+                    .filter(|far: &f64| *far > f64::NEG_INFINITY);
                 let found = || format!("far '{}'", shortened(text, 60));
-                let far = far.ok_or_else(|| row.error(found(), expected))?;
+                let refused = || row.error(found(), "a number above 0, inf or nothing");
+                let far = far.ok_or_else(refused)?;
                 Some(far).filter(|far| far.is_finite())
             }
             None => defaults.depths(eye).1,
@@ -251,20 +254,24 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
             true => Frame::looking_along,
             false => look_at,
         };
-        let frame = looking(eye, target, up).map_err(|error| match error {
-            CameraError::Invalid { found, .. } if !has_up && found.starts_with("up is") => {
-                let expected = "columns up_x,up_y,up_z";
-                CameraError::Invalid { found, expected }
-            }
-            other => other,
-        });
-        Ok(frame.and_then(|frame| {
+        let camera = looking(eye, target, up).and_then(|frame| {
             let kind = match height {
                 Some(height) => LensKind::Orthographic { height, aspect },
                 None => LensKind::Perspective { fovy_deg, aspect },
             };
             let lens = Lens::new(kind, near, far)?;
             Ok(Camera { frame, lens })
+        });
+        Ok(camera.map_err(|error| {
+            let CameraError::Invalid { found, expected } = error else {
+                return error;
+            };
+            let expected = match expected {
+                _ if !has_up && found.starts_with("up is") => "columns up_x,up_y,up_z",
+                "near < far" if by_scene => "near < far: a column far, or --far",
+                other => other,
+            };
+            CameraError::Invalid { found, expected }
         }))
     }))
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::{Pose, Stage, unfit};
 use crate::geometry::Aabb;
 use crate::input::Result;
-use crate::scene::{Regions, SeededRng};
+use crate::scene::{Regions, SeededRng, on_sphere};
 use crate::spec::Spec;
 
 /// Places drawn for each eye.
@@ -122,8 +122,7 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
 
 /// A direction in the plane of the ground, each equally likely.
 fn level(rng: &mut SeededRng) -> DVec3 {
-    let angle = std::f64::consts::TAU * rng.unit();
-    DVec3::new(libm::cos(angle), libm::sin(angle), 0.0)
+    on_sphere(0.0, std::f64::consts::TAU * rng.unit())
 }
 
 /// The places that one eye may take: in one room, where there are rooms.

@@ -233,6 +233,14 @@ fn a_share_below_all_that_can_be_reached_is_refused() {
             "{path}: {told}"
         );
     }
+    let scene = Scene::from_boxes("b", &boxes(9)).unwrap();
+    let mut away = path("outside:frames=4", &scene);
+    for Camera { frame, .. } in &mut away.cameras {
+        *frame = Frame::looking_along(frame.eye, -frame.forward(), frame.v()).unwrap();
+    }
+    let told = away.seeing(&scene, 0.2, None).map(drop).unwrap_err();
+    let wanted = "at most 0% of 'b' along it; expected a path that sees items";
+    assert!(told.to_string().ends_with(wanted), "{told}");
 }
 
 #[test]
@@ -389,6 +397,38 @@ fn reversed_depth_from_0_to_1_is_doubted_where_it_is_read_from_minus_1() {
     };
     let conventions = [MatrixConvention::ColumnGl, MatrixConvention::ColumnD3d];
     assert_eq!(conventions.map(told), [true, false]);
+}
+
+/// Two cameras along y with z up, and one that is rolled, turned down or far off.
+#[test]
+fn doubts_are_about_the_cameras_that_are_doubtful() {
+    let scene = Scene::from_boxes("b", &[WorldBox::new(-DVec3::ONE, DVec3::ONE)]).unwrap();
+    let told = |eye: f64, up: DVec3, near: &str| {
+        let header = "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z";
+        let [one, two] = [(DVec3::X, up), (DVec3::Y, DVec3::Z)].map(|(axis, up)| {
+            let [x, y, z] = (axis * -eye).to_array();
+            format!("{x},{y},{z},0,0,0,{},{},{},{near}\n", up.x, up.y, up.z)
+        });
+        let rows = format!("{header},near\n{one}{two}{two}");
+        let path = read_cameras_csv(
+            rows.as_bytes(),
+            "c",
+            &LensDefaults::default().of_scene(&scene),
+        );
+        path.map_or_else(
+            |e| vec![e.to_string()],
+            |p| warnings(&scene, "c", &p.cameras),
+        )
+    };
+    assert_eq!(told(5.0, DVec3::Z, "1"), [""; 0]);
+    let rolled = "c: y is up in 1 of 3 cameras, z in b";
+    assert_eq!(told(5.0, DVec3::Y, "1"), [rolled]);
+    let down = "c: 1 of 3 cameras rolled by more than 45 degrees, first with (0.000, 0.000, -1.000) up; z is up in b";
+    assert_eq!(told(5.0, -DVec3::Z, "1"), [down]);
+    let far = told(1e300, DVec3::Z, "1").concat();
+    assert!(far.contains("as loaded, up to 2.89e299"), "{far}");
+    let near = "near is 100 and far 6.928203230275509; expected near < far: a column far, or --far";
+    assert_eq!(told(5.0, DVec3::Z, "100"), [format!("c, line 2: {near}")]);
 }
 
 #[test]

@@ -190,12 +190,15 @@ impl Scene {
     ///
     /// Exact: where no original is kept, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
-        let originals = self.originals.boxes();
-        let items = self.items.iter().enumerate();
-        items.map(move |(id, item)| match originals {
+        (0..self.items.len()).map(|id| self.written_box(id))
+    }
+
+    /// The same of one item.
+    pub fn written_box(&self, id: usize) -> WorldBox {
+        match self.originals.boxes() {
             Some(boxes) => boxes[id],
-            None => WorldBox::of(item, self.origin),
-        })
+            None => WorldBox::of(&self.items[id], self.origin),
+        }
     }
 
     /// The scene as it is read back from a boxes file.

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec3, Vec3};
 
-use super::sheet::{Built, ORACLE, Sheet, slack};
+use super::sheet::{Built, ORACLE, Sheet, sees_exactly, sees_fused, slack};
 use super::{Level, Name, Names, Row, Said, Status, Vector, VectorBox, VectorCamera};
 use crate::camera::{CameraError, PlaneOptions, Surroundings};
 use crate::culling::{Arithmetic, Culling, CullingError, CullingTest, TESTS};
@@ -264,7 +264,13 @@ fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: 
         let explain = |b: &Aabb, _| Some(explain_visibility(b, &volume));
         sheet.compared([structure, test], &wanted, &answer, explain);
     }
-    sheet.without_rounding(&volume);
+    let (six, exact) = (CullingTest::SixPlane, &vector.p_vertex_exact_visible);
+    // Exact sums are of finite numbers.
+    if exact.is_some() {
+        sheet.seen(six, exact, sheet.names_of(|b| sees_exactly(&volume, b)));
+    }
+    let fused = &vector.observed_f32_pvertex_fma;
+    sheet.seen(six, fused, sheet.names_of(|b| sees_fused(&volume, b)));
     let (visible, touch) = (&vector.expected_visible_planes, &vector.touch_planes);
     sheet.verdicts(&Oracle::of_volume(&volume), visible, touch);
 }

@@ -73,6 +73,15 @@ pub fn sees_exactly(volume: &ConvexVolume, b: &Aabb) -> bool {
     !b.is_empty() && !volume.planes().iter().any(excludes)
 }
 
+/// The six-plane test in f32 with fused sums, from the offset to z, y and x.
+pub fn sees_fused(volume: &ConvexVolume, b: &Aabb) -> bool {
+    let excludes = |plane: &Plane| {
+        let (n, x) = (plane.normal, plane.p_vertex(b));
+        n.x.mul_add(x.x, n.y.mul_add(x.y, n.z.mul_add(x.z, plane.d))) < 0.0
+    };
+    !b.is_empty() && !volume.planes().iter().any(excludes)
+}
+
 /// Name of the oracle's own rows in place of a structure.
 pub const ORACLE: &str = "oracle";
 
@@ -219,15 +228,12 @@ impl Sheet<'_> {
         Ok(names)
     }
 
-    /// Adds the row of the six-plane test in real numbers, if the file declares it.
-    pub fn without_rounding(&mut self, volume: &ConvexVolume) {
-        let Some(wanted) = &self.vector.p_vertex_exact_visible else {
-            return;
-        };
-        let seen = self.names_of(|b| sees_exactly(volume, b));
-        let got = Ok(seen.iter().cloned().collect());
-        let subject = [ORACLE, CullingTest::SixPlane.name()];
-        self.answered(None, subject, seen == *wanted, wanted, &got);
+    /// Adds the row of the boxes that a test sees, if the file lists them.
+    pub fn seen(&mut self, test: CullingTest, listed: &Option<Names>, seen: Names) {
+        if let Some(listed) = listed {
+            let got = Ok(seen.iter().cloned().collect());
+            self.answered(None, [ORACLE, test.name()], seen == *listed, listed, &got);
+        }
     }
 
     /// Adds rows of the oracle's verdicts: visible and touching exactly as declared.
@@ -256,12 +262,8 @@ impl Sheet<'_> {
                 wrong.push((name, wanted, format!("{found:?}").to_lowercase()));
             }
         }
+        self.seen(CullingTest::Exact, visible, self.seen_by(oracle));
         let subject = [ORACLE, CullingTest::Exact.name()];
-        if let Some(listed) = visible {
-            let seen = self.seen_by(oracle);
-            let got = Ok(seen.iter().cloned().collect());
-            self.answered(None, subject, seen == *listed, listed, &got);
-        }
         for (name, expected, got) in wrong {
             let expected = format!("{expected:?}").to_lowercase();
             self.row(Some(name), subject, Status::Fail, expected, got);

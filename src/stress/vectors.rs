@@ -13,10 +13,10 @@ use serde_json::Value;
 
 use crate::camera::{Camera, CameraError, Lens};
 use crate::geometry::{Aabb, Plane};
-use crate::input::{InputError, note, read_file};
+use crate::input::{InputError, Result, note, read_file};
 use crate::json::{JsonError, from_json};
 use crate::oracle::Pose;
-use crate::shown::plain;
+use crate::shown::{counted, plain};
 use crate::spec::nearest;
 use crate::stress::Level;
 
@@ -28,6 +28,9 @@ pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 /// The narrowest angle of view that the oracle of a camera carries, degrees.
 const CARRIED_DEG: f64 = 1e-12;
 
+/// Derivations of planes, of which those in a file are the result.
+const METHODS: &str = "given frame_f32 gh_gl_f32 gh_gl_f32_raw gh_revz_f32";
+
 /// Names of boxes; sorted, so that they print alike every time.
 pub type Names = BTreeSet<Name>;
 
@@ -37,6 +40,7 @@ pub struct Vector {
     /// Unique in its file.
     pub id: Name,
     category: Option<Name>,
+    plane_method: Option<Value>,
     planes: Option<Vec<Array<Narrow, 4>>>,
     /// Replaces `planes` where a file has both: the answers are about these bits.
     planes_f32_hex: Option<Vec<Array<Bits, 4>>>,
@@ -54,7 +58,8 @@ pub struct Vector {
     pub touch_camera: Option<Names>,
     /// Answer of the f32 six-plane test.
     pub observed_f32_pvertex_mul_add: Option<Names>,
-    observed_f32_pvertex_fma: Option<Names>,
+    /// The same where products and sums are fused.
+    pub observed_f32_pvertex_fma: Option<Names>,
     /// Answer of the six-plane test without any rounding.
     pub p_vertex_exact_visible: Option<Names>,
     expect_camera_error: Option<Declared>,
@@ -183,7 +188,10 @@ impl Vector {
         let of_planes = !self.named(Level::Planes).is_empty();
         let (no_camera, no_planes) = (self.camera.is_none(), self.planes().is_none());
         let is_refused = self.camera_error().is_some();
+        let method = self.plane_method.as_ref().and_then(Value::as_str);
+        let is_other = method.is_some_and(|own| !METHODS.split(' ').any(|known| known == own));
         let found = [
+            is_other.then_some("a plane_method that is none of the format"),
             (no_camera && (seen || is_refused)).then_some("claims about a camera but no camera"),
             (seen && is_refused).then_some("boxes seen by a camera that must be refused"),
             (no_planes && (of_planes || self.planes_error().is_some()))
@@ -236,7 +244,7 @@ fn vector(row: Array<Number, 3>) -> DVec3 {
 ///
 /// # Errors
 /// None, unless the file in the source was broken; a test reads it.
-pub fn built_in() -> Result<Vec<Vector>, InputError> {
+pub fn built_in() -> Result<Vec<Vector>> {
     read_vectors(BUILT_IN.as_bytes(), BUILT_IN_NAME)
 }
 
@@ -244,7 +252,7 @@ pub fn built_in() -> Result<Vec<Vector>, InputError> {
 ///
 /// # Errors
 /// A file that cannot be read, or is wrong.
-pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
+pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>> {
     let bytes = read_file(path)?;
     read_vectors(&bytes, &path.display().to_string())
 }
@@ -257,29 +265,20 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
-pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
+pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>> {
     let vectors: Vec<Vector> = list(bytes).map_err(|error: JsonError| {
         let form = || format!("JSON in the form of {BUILT_IN_NAME}");
         let (place, expected) = (error.place(), error.expected.unwrap_or_else(form));
         InputError::at(file, place, error.found, expected)
     })?;
-    let again = |place: String, id: &Name| {
-        let found = format!("the id '{}' a second time", plain(&id.0));
-        InputError::at(file, place, found, "an id of its own")
-    };
-    if let Some((n, id)) = repeated(vectors.iter().map(|vector| &vector.id)) {
-        return Err(again(format!("vectors[{n}]"), id));
-    }
+    unique(file, "vectors", vectors.iter().map(|vector| &vector.id))?;
     for (n, vector) in vectors.iter().enumerate() {
-        if let Some((i, id)) = repeated(vector.boxes().map(|b| &b.id)) {
-            return Err(again(format!("vectors[{n}].boxes[{i}]"), id));
-        }
-        if let Some((i, id)) = repeated(vector.points().map(|p| &p.id)) {
-            return Err(again(format!("vectors[{n}].points[{i}]"), id));
-        }
+        let of = |list| format!("vectors[{n}].{list}");
+        unique(file, &of("boxes"), vector.boxes().map(|b| &b.id))?;
+        unique(file, &of("points"), vector.points().map(|p| &p.id))?;
     }
     note_unjudged(&vectors, file);
-    note_unknown(bytes, file);
+    note_unknown(bytes, file, vectors.len());
     Ok(vectors)
 }
 
@@ -305,7 +304,7 @@ fn note_unjudged(vectors: &[Vector], file: &str) {
 fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
     match value {
         Value::Array(list) => list.iter().for_each(|value| fields(holder, value, found)),
-        Value::Object(map) => map.iter().for_each(|(name, value)| {
+        Value::Object(map) if HOLDERS.contains(&holder) => map.iter().for_each(|(name, value)| {
             found.insert([holder, name].map(str::to_owned));
             fields(name, value, found);
         }),
@@ -313,20 +312,26 @@ fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
     }
 }
 
-/// Tells of fields that the format does not have.
+/// Tells of a wrong count, and of fields that the format does not have.
 ///
 /// Those that are nearly one of it, and all of a camera: they may change its view.
-fn note_unknown(bytes: &[u8], file: &str) {
-    let all = |bytes| {
-        let (mut found, value) = (BTreeSet::new(), from_json(bytes).unwrap_or(Value::Null));
+fn note_unknown(bytes: &[u8], file: &str, vectors: usize) {
+    let value = |bytes| from_json(bytes).unwrap_or(Value::Null);
+    let all = |value: &Value| {
+        let mut found = BTreeSet::new();
         let holder = if value.is_array() { "vectors" } else { "file" };
-        fields(holder, &value, &mut found);
-        found.retain(|[holder, _]| HOLDERS.contains(&holder.as_str()));
+        fields(holder, value, &mut found);
         found
     };
+    let read = value(bytes);
+    let count = read["count"].as_f64();
+    if let Some(count) = count.filter(|count| *count != vectors as f64) {
+        let vectors = counted(vectors, "vector");
+        note(&format!("{file}: count is {count} for {vectors}"));
+    }
     // The built-in vectors have every field.
-    let known = all(BUILT_IN.as_bytes());
-    for [holder, name] in all(bytes).difference(&known) {
+    let known = all(&value(BUILT_IN.as_bytes()));
+    for [holder, name] in all(&read).difference(&known) {
         let own = known.iter().filter(|[of, _]| of == holder);
         let guess = match nearest(name, own.map(|[_, field]| field.as_str())) {
             Some(guess) => format!(" (did you mean '{guess}'?)"),
@@ -341,10 +346,14 @@ fn note_unknown(bytes: &[u8], file: &str) {
 /// Objects with fields of the format; others have names of boxes.
 const HOLDERS: [&str; 5] = ["file", "vectors", "camera", "boxes", "points"];
 
-/// The first id that occurred before, and its index.
-fn repeated<'v>(ids: impl Iterator<Item = &'v Name>) -> Option<(usize, &'v Name)> {
+/// Refuses an id that occurred before in a list.
+fn unique<'v>(file: &str, list: &str, ids: impl Iterator<Item = &'v Name>) -> Result<()> {
     let mut seen = BTreeSet::new();
-    ids.enumerate().find(|(_, id)| !seen.insert(*id))
+    ids.enumerate().try_for_each(|(n, id)| {
+        let found = format_args!("the id '{}' a second time", plain(&id.0));
+        let again = || InputError::at(file, format_args!("{list}[{n}]"), found, "an id of its own");
+        seen.insert(id).then_some(()).ok_or_else(again)
+    })
 }
 
 #[derive(Deserialize)]

@@ -233,12 +233,16 @@ fn what_is_to_outlive_its_terminal_does() {
 }
 
 #[test]
-fn a_stopped_verify_does_not_claim_success() {
-    let child = start(Path::new("."), "verify --cases 100000000");
-    sleep(Duration::from_millis(300));
-    let done = interrupt(child);
-    assert_eq!(done.code, Some(130));
-    assert!(done.err.contains("interrupted"), "{}", done.err);
+fn a_stopped_check_does_not_claim_success() {
+    for line in ["verify", "stress"] {
+        let child = start(Path::new("."), &format!("{line} --cases 100000"));
+        sleep(Duration::from_millis(300));
+        let done = interrupt(child);
+        assert_eq!(done.code, Some(130), "{line}");
+        assert!(done.err.contains("interrupted"), "{line}: {}", done.err);
+        let is_told = unwrapped(&done.out).contains("; interrupted: others were left out");
+        assert!(is_told || line == "verify", "{}", done.out);
+    }
 }
 
 /// Processes that read different scenes measure nothing.

@@ -20,6 +20,7 @@ fn subset(ids: &[&str]) -> Value {
     let list = file["vectors"].as_array_mut().expect("an array");
     list.retain(|v| ids.contains(&v["id"].as_str().expect("an id")));
     assert_eq!(list.len(), ids.len());
+    file["count"] = json!(ids.len());
     file
 }
 

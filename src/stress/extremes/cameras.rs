@@ -46,10 +46,7 @@ impl Hull {
         let far = camera.lens.far().unwrap_or(deep);
         let lens = camera.lens.with_far(Some(far)).ok()?;
         let frame = camera.frame.relative_to(around.origin);
-        let camera = Camera {
-            lens,
-            frame: camera.frame,
-        };
+        let camera = Camera { lens, ..*camera };
         // Only as a hint where inside is.
         let planes = camera.convex_volume_f64(around).ok()?;
         let normals: Vec<DVec3> = planes.planes().iter().map(|p| p.normal).collect();
@@ -82,8 +79,7 @@ pub fn adversarial(
     let mut boxes: Vec<Aabb> = Vec::with_capacity(count);
     for i in 0..count {
         if shapes == Shapes::Coincident && i >= 16 {
-            let again = boxes[i % 16];
-            boxes.push(again);
+            boxes.push(boxes[i % 16]);
             continue;
         }
         let mut b = match rng.below(8) {
@@ -151,8 +147,7 @@ fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
 /// A box well inside, beside, behind or before the volume: a plane that is
 /// missing or far off shows here.
 fn astray(rng: &mut SeededRng, hull: &Hull) -> Aabb {
-    let wide = |rng: &mut SeededRng| rng.between(-0.5, 1.5);
-    let (s, t) = (wide(rng), wide(rng));
+    let (s, t) = (rng.between(-0.5, 1.5), rng.between(-0.5, 1.5));
     // The size of near against the depth of the volume.
     let near = (hull.corners[0] - hull.corners[3]).length();
     let far = (hull.corners[4] - hull.corners[7]).length();

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, PlaneOptions, Surroundings};
-use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
+use crate::culling::{Arithmetic, Culling, CullingError, CullingTest};
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
 use crate::oracle::Verdict;
@@ -201,30 +201,25 @@ impl Case {
         let boxes = (items, found.built(structures, Input::new(&items[..share])));
         let input = Input::new(&cubes[..share]).spheres(true);
         let spheres = (&cubes[..], found.built(structures, input));
-        for (arithmetic, arithmetic_name, _) in ARITHMETICS {
-            for (test, test_name, _) in TESTS {
-                let culling = Culling::new(test, arithmetic, self.planes);
-                if culling.check().is_err() {
-                    continue;
+        for culling in Culling::all(self.planes) {
+            let (test, numbers) = (culling.test, culling.arithmetic);
+            let name = match numbers {
+                Arithmetic::F32 => test.name().to_owned(),
+                _ => format!("{} {}", test.name(), numbers.name()),
+            };
+            let (items, built) = match test {
+                CullingTest::Sphere => &spheres,
+                _ => &boxes,
+            };
+            match culling.view(&self.camera, &self.around) {
+                Ok(view) => {
+                    let view = view.as_any();
+                    let seen: Vec<ItemId> = scan(items, |b| view.sees(b)).collect();
+                    self.scalar(&culling, &name, &seen, &mut found);
+                    found.compare(built, &name, view, &items[..share]);
                 }
-                let name = match arithmetic {
-                    Arithmetic::F32 => test_name.to_owned(),
-                    _ => format!("{test_name} {arithmetic_name}"),
-                };
-                let (items, built) = match test {
-                    CullingTest::Sphere => &spheres,
-                    _ => &boxes,
-                };
-                match culling.view(&self.camera, &self.around) {
-                    Ok(view) => {
-                        let view = view.as_any();
-                        let seen: Vec<ItemId> = scan(items, |b| view.sees(b)).collect();
-                        self.scalar(&culling, &name, &seen, &mut found);
-                        found.compare(built, &name, view, &items[..share]);
-                    }
-                    Err(error) if self.may_refuse(&error) => found.tally.refused += 1,
-                    Err(error) => found.fault([SCALAR, &name], None, "a view", error.to_string()),
-                }
+                Err(error) if self.may_refuse(&error) => found.tally.refused += 1,
+                Err(error) => found.fault([SCALAR, &name], None, "a view", error.to_string()),
             }
         }
         self.check_without_epsilon(&boxes.1, &cubes, share, &mut found);
@@ -280,30 +275,28 @@ impl Case {
         let errors = self.errors(seen);
         let is_ghost = |id: &&ItemId| self.items[**id as usize].is_empty();
         let ghosts = seen.iter().filter(is_ghost).count();
-        let promised = culling.arithmetic != Arithmetic::F64;
-        // Without a margin f64 is as good as its own roundings. Planes that
-        // are sums of others have lost digits; they are measured, not judged.
-        let judged = promised || culling.test == CullingTest::SixPlane;
         let allowed = self.size() * F64_MARGIN;
-        let lost = match promised {
-            true => errors.dropped() > 0,
-            false => judged && errors.worst_miss > allowed,
+        let (lost, expected) = match culling.arithmetic {
+            // Without a margin f64 is as good as its own roundings. Planes that
+            // are sums of others have lost digits; they are measured, not judged.
+            Arithmetic::F64 => {
+                let judged = culling.test == CullingTest::SixPlane;
+                let text = format!("nothing dropped that is deeper than {allowed:e}");
+                (judged && errors.worst_miss > allowed, text)
+            }
+            _ => {
+                found.tally.errors.false_negatives += errors.false_negatives;
+                found.tally.errors.touch_dropped += errors.touch_dropped;
+                let text = "nothing dropped that is inside or touches, nothing empty returned";
+                (errors.dropped() > 0, text.to_owned())
+            }
         };
-        if promised {
-            found.tally.errors.false_negatives += errors.false_negatives;
-            found.tally.errors.touch_dropped += errors.touch_dropped;
-        }
         if lost || ghosts > 0 {
             let is_wrong = |&(id, verdict, seen): &(usize, Verdict, bool)| match seen {
                 true => self.items[id].is_empty(),
                 false => verdict != Verdict::Out,
             };
             let first = self.truth.answered(seen).find(is_wrong);
-            let proven = "nothing dropped that is inside or touches, nothing empty returned";
-            let expected = match promised {
-                true => proven.to_owned(),
-                false => format!("nothing dropped that is deeper than {allowed:e}"),
-            };
             let got = format!(
                 "{} false negatives (deepest {:e}), {} boundary contacts dropped, {} empty boxes returned",
                 errors.false_negatives, errors.worst_miss, errors.touch_dropped, ghosts

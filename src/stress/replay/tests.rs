@@ -193,7 +193,7 @@ fn a_lens_that_is_narrower_than_the_oracle_carries_fails_nothing() {
 }
 
 #[test]
-fn the_six_plane_test_without_rounding_is_judged_beside_the_one_in_f32() {
+fn the_six_plane_test_fused_and_without_rounding_is_judged() {
     let structures = Registry::builtin().structures("linear").unwrap();
     let named = |rows: &[Row]| -> Vec<Status> {
         let test = CullingTest::SixPlane.name();
@@ -202,19 +202,25 @@ fn the_six_plane_test_without_rounding_is_judged_beside_the_one_in_f32() {
             .filter(|row| row.test == test && row.structure == ORACLE);
         exact.map(|row| row.status).collect()
     };
-    let mut differ = 0;
+    let mut differ = [0; 2];
     for mut vector in built_in().unwrap() {
         let Some(exact) = vector.p_vertex_exact_visible.clone() else {
             continue;
         };
-        differ += u32::from(vector.observed_f32_pvertex_mul_add.as_ref() != Some(&exact));
+        let unfused = vector.observed_f32_pvertex_mul_add.as_ref();
+        differ[0] += u32::from(unfused != Some(&exact));
+        differ[1] += u32::from(unfused != vector.observed_f32_pvertex_fma.as_ref());
         let passed = named(&replay(&vector, &structures));
         assert!(passed.iter().all(|&status| status == Status::Pass));
         if passed.is_empty() {
             continue;
         }
-        vector.p_vertex_exact_visible = Some(Names::from([Name("no box".to_owned())]));
-        assert_eq!(named(&replay(&vector, &structures)), [Status::Fail]);
+        let wrong = Some(Names::from([Name("no box".to_owned())]));
+        vector.p_vertex_exact_visible = wrong.clone();
+        let one = [Status::Fail, Status::Pass];
+        assert_eq!(named(&replay(&vector, &structures)), one);
+        vector.observed_f32_pvertex_fma = wrong;
+        assert_eq!(named(&replay(&vector, &structures)), [Status::Fail; 2]);
     }
-    assert_eq!(differ, 6, "vectors whose f32 answer is another one");
+    assert_eq!(differ, [6, 6], "vectors whose f32 answer is another one");
 }

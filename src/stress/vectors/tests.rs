@@ -160,6 +160,11 @@ fn claims_and_fields_that_are_not_judged_are_told() {
             &camera.replace("near", "ortho_height\":8,\"near"),
             "field 'ortho_height' of 'camera' is not read",
         ),
+        (
+            r#""plane_method":"magic""#,
+            "vectors[0]: a plane_method that is none of the format; not judged",
+        ),
+        (r#""plane_method":"gh_gl_f32""#, ""),
         // A list without names claims nothing.
         (
             r#""expected_visible_camera":[],"touch_camera":null,"touch_planes":[]"#,
@@ -187,6 +192,10 @@ fn claims_and_fields_that_are_not_judged_are_told() {
         );
     }
     assert_eq!(notes("note-b.json", BUILT_IN), [""; 0]);
+    let counted = |count| format!(r#"{{"count":{count},"vectors":[{{"id":"v"}}]}}"#);
+    let wanted = [": count is 9 for 1 vector"];
+    assert_eq!(notes("note-c.json", &counted("9")), wanted);
+    assert_eq!(notes("note-d.json", &counted("1.0")), [""; 0]);
 }
 
 #[test]
