@@ -1,6 +1,5 @@
 //! Quake III maps, and archives with scenes in them.
 
-
 use cullbench::camera::{Camera, Frame, Lens};
 use cullbench::index::{Input, Registry};
 use cullbench::scene::{CameraPlace, LoadOptions, Regions, part_names, read_bytes, read_ibsp};
