@@ -38,8 +38,11 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let share = needed as f64 / all.max(1) as f64;
     let (inside, planes) = (all - needed, counted(all, "plane"));
     let reason = format!("scene is inside {inside} of {planes}");
-    let left_out = trials.index(&*case.index, fewer);
-    let sides = Sides::new(&case.spec.label, BASE, left_out);
+    // Two sides of the same planes would only differ by the day.
+    let sides = (inside > 0).then(|| {
+        let left_out = trials.index(&*case.index, fewer);
+        Sides::new(&case.spec.label, BASE, left_out)
+    });
     Ok(Draft::new(sides, Finding::new(share, MOST_NEEDED, reason)))
 }
 

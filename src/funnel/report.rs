@@ -264,9 +264,9 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
         )
     });
     let inner = report.inner_boxes.as_ref();
-    let none_closed = inner.is_some_and(|inner| inner.boxed_count == 0);
+    let none_boxed = inner.is_some_and(|inner| inner.boxed_count == 0);
     let gains = report.gains.iter();
-    let gains = gains.filter_map(|gain| of_gain(gain, &report.stages, none_closed));
+    let gains = gains.filter_map(|gain| of_gain(gain, &report.stages, none_boxed));
     let told: Vec<String> = last.into_iter().chain(gains).collect();
     let mut sentences = vec![told.join(" ")];
     sentences.extend(report.stages.iter().filter_map(StageRow::loss));
@@ -277,7 +277,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
 /// A sentence on a stage; lost visible items are no savings.
 ///
 /// None on the depth test, which costs a GPU next to nothing.
-fn of_gain(gain: &Gain, stages: &[StageRow], none_closed: bool) -> Option<String> {
+fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String> {
     if gain.stage == StageKind::Fragment {
         return None;
     }
@@ -300,10 +300,14 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_closed: bool) -> Option<String
         (None, _) if gain.removed() > 0.0 => return None,
         // What nothing is found to hide may well be hidden.
         (None, Some(hidden)) if hidden > 0.0 => {
-            let why = ["", ": no item is closed, so none is an occluder"];
-            let why = why[usize::from(none_closed)];
+            let why = [
+                "",
+                ": no box is found inside of a closed one, so none is an occluder",
+            ];
+            let why = why[usize::from(none_boxed)];
             let hidden = significant(hidden);
-            format!("{what} removes nothing, though {hidden} of the items left are hidden{why}.")
+            let left = format!("{hidden} of the items left are in front at no sample");
+            format!("{what} removes nothing, though {left}{why}.")
         }
         (None, _) => {
             format!("{what} is not needed: it removes nothing that the other stages leave.")
@@ -408,8 +412,8 @@ mod tests {
             row.errors.truth_count = truth_count;
             of_gain(&named(StageKind::Occlusion), &[row], true).expect("one")
         };
-        let wanted = "occlusion (masked) removes nothing, though 2.00 of the items left are hidden: \
-            no item is closed, so none is an occluder.";
+        let wanted = "occlusion (masked) removes nothing, though 2.00 of the items left are in front \
+            at no sample: no box is found inside of a closed one, so none is an occluder.";
         assert_eq!(row(1.0), wanted);
         assert!(row(3.0).contains("is not needed"));
     }
