@@ -184,6 +184,9 @@ pub struct ReportArgs {
     /// Write charts into a folder: speed-ups per scene and path, time against items
     #[arg(long, value_name = "DIR")]
     pub svg: Option<PathBuf>,
+    /// Show all columns in place of those that fit, as `run` does
+    #[arg(long, conflicts_with = "history")]
+    pub all_columns: bool,
     /// Write one self-contained page with charts and tables, as `run` does
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

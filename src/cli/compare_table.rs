@@ -343,8 +343,9 @@ impl CompareTable<'_> {
         let mut rows = self.changes.rows.iter();
         let lacks_others = rows.any(|row| row.reason.iter().any(|why| why.contains(FEW_OTHERS)));
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
-        let mut undecided = judged.filter(|found| found.change == Change::Inconclusive);
-        let is_hopeless = |found: Judgement| found.lower.is_some() && found.more_pairs.is_none();
+        let undecided = judged.filter(|found| found.change == Change::Inconclusive);
+        let undecided: Vec<Judgement> = undecided.collect();
+        let is_hopeless = |found: &Judgement| found.lower.is_some() && found.more_pairs.is_none();
         let is_stopped = |side: &Side| side.json.get("finished_at") == Some(&Value::Null);
         let told = match (self.basis, more) {
             _ if is_stopped(&self.old) || is_stopped(&self.new) => {
@@ -354,7 +355,7 @@ impl CompareTable<'_> {
                 format!("about {} would decide", text::counted(more, "more pair"))
             }
             (Basis::Pairs, None) => "more pairs would not decide".to_owned(),
-            (Basis::Reports, _) if undecided.any(is_hopeless) => {
+            (Basis::Reports, _) if undecided.iter().any(is_hopeless) => {
                 "more processes would not decide: run both again, or compare --against BINARY"
                     .to_owned()
             }
@@ -375,7 +376,13 @@ impl CompareTable<'_> {
                 )
             }
         };
-        Some(format!("{inconclusive} inconclusive: {told}"))
+        // Of many cells some are beyond it by chance.
+        let most = Some(1.0 + self.changes.threshold);
+        let why = match undecided.iter().any(|found| found.lower > most) {
+            true => " (an interval is of one cell, a verdict allows for all of them)",
+            false => "",
+        };
+        Some(format!("{inconclusive} inconclusive{why}: {told}"))
     }
 }
 

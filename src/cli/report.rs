@@ -70,8 +70,8 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
         let folder = if path.is_dir() { path } else { folder_of(path) };
         write_text(file, &page(&report, folder, Vec::new()))?;
     } else if args.markdown.is_none() && args.svg.is_none() && args.bencher.is_none() {
-        match io::stdout().is_terminal() {
-            true => show(&shown(&report, false, text::width()))?,
+        match args.all_columns || io::stdout().is_terminal() {
+            true => show(&shown(&report, args.all_columns, text::width()))?,
             false => io::stdout().write_all(markdown().as_bytes())?,
         }
     }

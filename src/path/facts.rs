@@ -156,8 +156,9 @@ const FAR_OUTSIDE: f64 = 3.0;
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
-    const DOUBTS: [Doubt; 7] = [
+    const DOUBTS: [Doubt; 8] = [
         bare,
+        narrow,
         rolled,
         sheared,
         shallow,
@@ -217,6 +218,14 @@ fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
     Some(format!(
         "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
     ))
+}
+
+/// Perspectives all of which are so narrow that their angle may be in radians.
+fn narrow(_: &Scene, cameras: &[Camera]) -> Option<String> {
+    let is_narrow = |camera: &Camera| shape(&camera.lens)[0].is_some_and(|fovy| fovy < 2.0);
+    let is_doubtful = !cameras.is_empty() && cameras.iter().all(is_narrow);
+    let what = "a field of view under 2 degrees in all cameras; fovy is in degrees, not in radians";
+    is_doubtful.then(|| what.to_owned())
 }
 
 /// Orthographic matrices whose view would look down if near and far were swapped.

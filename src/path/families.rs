@@ -140,7 +140,7 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
 /// Roll and lens are the file's, where it states them. `frames` of them at most.
 pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     if stage.scene.places.is_empty() {
-        let wanted = "expected one with places, such as a Doom map";
+        let wanted = "expected one with places: a Doom map, a glTF with cameras";
         let found = format_args!("'{}' has no camera places of its own", stage.scene.name);
         return Err(unfit("places", format_args!("scene {found}; {wanted}")));
     }

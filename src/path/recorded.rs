@@ -93,7 +93,9 @@ const FAR_IN_NEARS: f64 = 1000.0;
 /// place to look at and a direction.
 pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Result<CameraPath> {
     let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
-    let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
+    // Other names, as `_11`, where a convention is given: the error is about matrices.
+    let has = |names: &[&str]| names.iter().any(|name| table.column(name).is_some());
+    let is_matrix = has(&MATRIX_ENTRIES) || defaults.matrix.is_some() && !has(&OF_EYES);
     let read: CameraReader = match is_matrix {
         true => matrices(&table, defaults.matrix)?,
         false => eyes(&table, defaults)?,
@@ -405,6 +407,13 @@ mod tests {
         assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
+        let row_d3d = LensDefaults {
+            matrix: Some(MatrixConvention::RowD3d),
+            ..LensDefaults::default()
+        };
+        let wrong = read_cameras_csv(b"_11,_12\n1,2\n", "c.csv", &row_d3d);
+        let wrong = wrong.unwrap_err().to_string();
+        assert!(wrong.contains("no column 'm00'"), "{wrong}");
     }
 
     #[test]

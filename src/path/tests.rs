@@ -381,6 +381,21 @@ fn a_matrix_of_a_view_alone_is_doubted() {
 }
 
 #[test]
+fn angles_in_radians_are_doubted() {
+    let scene = scene("uniform:n=50");
+    let told = |fovy: [f64; 2]| {
+        let row = |fovy| format!("0,0,0,1,0,0,{fovy}\n");
+        let text = "eye_x,eye_y,eye_z,look_x,look_y,look_z,fovy_deg\n".to_owned();
+        let text = text + &fovy.map(row).concat();
+        let read = read_cameras_csv(text.as_bytes(), "c", &LensDefaults::default());
+        let told = warnings(&scene, "c", &read.unwrap().cameras).join(", ");
+        told.contains("c: a field of view under 2 degrees in all cameras")
+    };
+    // A zoom may end as narrow.
+    assert_eq!([[1.0472, 0.8], [60.0, 1.0]].map(told), [true, false]);
+}
+
+#[test]
 fn reversed_depth_from_0_to_1_is_doubted_where_it_is_read_from_minus_1() {
     let scene = scene("uniform:n=50");
     let (near, far) = (0.1, 60.0);
