@@ -26,10 +26,7 @@ const BYTES_PER_OBJECT: u64 = (size_of::<Node>() + size_of::<ExactNode>()) as u6
 
 /// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
 fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
-    let number = |at: usize| {
-        let bytes = bytes.get(at..at + 4)?.try_into().ok()?;
-        Some(u32::from_le_bytes(bytes) as usize)
-    };
+    let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize);
     let bytes = bytes.get(..number(8)?)?;
     let chunk = |at: usize| {
         let end = at + 8 + number(at)?;
@@ -65,7 +62,7 @@ fn lenient(mut json: Value) -> Option<Root> {
 }
 
 /// Nodes and cameras as the file states them: the typed form rounds numbers to f32.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub struct Exact {
     #[serde(default)]
     pub nodes: Vec<ExactNode>,

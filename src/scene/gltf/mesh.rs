@@ -93,12 +93,11 @@ impl File<'_> {
         let mut all = Mesh::default();
         for (place, primitive, positions) in drawn.clone() {
             let place = format!("meshes[{index}].primitives[{place}]");
-            let accessor = self.get(&self.root.accessors, positions, &place)?;
             let names = primitive.extensions.iter().flat_map(|e| e.others.keys());
             let names = names.filter(|name| name.contains("compression"));
-            let unread = self.compressed(names, accessor.buffer_view.is_some());
-            let mut all_of = [Some(positions), primitive.indices].into_iter().flatten();
-            match unread.or_else(|| all_of.find_map(|index| self.unread(index))) {
+            let mut accessors = [Some(positions), primitive.indices].into_iter().flatten();
+            let unread = accessors.find_map(|index| self.unread(index));
+            match self.compressed(names, unread.is_none()).or(unread) {
                 Some(reason) => self.push_box(&mut all, positions, &reason)?,
                 None => self.primitive(&mut all, primitive, positions, &place)?,
             }

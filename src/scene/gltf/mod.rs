@@ -53,7 +53,7 @@ pub(super) fn read_beside(
     options: &LoadOptions,
     beside: Beside,
 ) -> Result<Scene> {
-    let file = File::open(bytes, file, beside)?;
+    let mut file = File::open(bytes, file, beside)?;
     let (placed, places, order) = file.placed()?;
     file.note_unread(&placed, &order, places.len());
     let animation = file.camera_animation(&order).transpose();
@@ -68,6 +68,8 @@ pub(super) fn read_beside(
     let mut labels = Labels::new("name");
     let names = placed.iter().map(|item| &file.root.nodes[item.node].name);
     names.for_each(|name| labels.push(name.as_deref().unwrap_or_default()));
+    // Nodes and buffers are larger than many scenes.
+    (file.root, file.exact, file.buffers) = Default::default();
     Ok(Scene {
         up: UpAxis::Y,
         unit: Some("m"),
@@ -183,9 +185,8 @@ impl File<'_> {
         let place = format!("nodes[{index}].extensions.EXT_mesh_gpu_instancing");
         let index = |at: &Value| Some(Index::new(u32::try_from(at.as_u64()?).unwrap_or(u32::MAX)));
         let all = attributes.as_object().into_iter().flat_map(Map::values);
-        let accessors = all.filter_map(index);
-        let accessors = accessors.map(|at| self.get(&self.root.accessors, at, &place));
-        let counts = accessors.map(|accessor| Ok(accessor?.count.0));
+        let all = all.filter_map(index);
+        let counts = all.map(|at| Ok(self.get(&self.root.accessors, at, &place)?.count.0));
         let counts: Vec<u64> = counts.collect::<Result<_>>()?;
         let [least, count] = [counts.iter().min(), counts.iter().max()].map(|c| *c.unwrap_or(&0));
         let most = MOST_ITEMS.saturating_sub(before).min(self.bytes) as u64;
@@ -241,6 +242,7 @@ impl File<'_> {
         if !placed.iter().any(|item| of(item).has_own) {
             return Ok(scene);
         }
+        drop(boxes);
         let mut surfaces = Surfaces::about(origin);
         for item in placed {
             let mesh = of(item);
