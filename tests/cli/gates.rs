@@ -316,14 +316,14 @@ fn bencher_gets_every_right_cell_once() {
     // What is no default is in the name.
     for (from, to) in [
         ("\"epsilon\":8.0", "\"epsilon\":64.0"),
-        ("\"f32\"", "\"f64\""),
+        ("\"f32\"", "\"f32-relative\""),
     ] {
         let text = fs::read_to_string(folder.path().join("new.json")).expect("there");
         fs::write(folder.path().join("new.json"), text.replace(from, to)).expect("writable");
     }
     works(folder.path(), "report new.json --bencher b.json");
     let written = fs::read_to_string(folder.path().join("b.json")).expect("written");
-    let name = "bvh on uniform:n=300, orbit:frames=8, six-plane, f64, epsilon 64";
+    let name = "bvh on uniform:n=300, orbit:frames=8, six-plane, f32-relative, epsilon 64";
     assert_ne!(json(&written)[name], Value::Null, "{written}");
     let wanted = "b.json: an input or another output | --bencher";
     all_refused(&folder, &["report b.json --bencher b.json"], wanted);
@@ -350,5 +350,5 @@ fn the_commands_of_the_workflows_exist() {
         let done = cullbench(folder.path(), &format!("{command} --help"));
         assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{command}");
     });
-    assert_eq!(tried.count(), 10);
+    assert_eq!(tried.count(), 13);
 }
