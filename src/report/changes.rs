@@ -289,7 +289,7 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
 /// nothing with too few others.
 ///
 /// If the others are even in number, the one that moved farthest from the median of all does
-/// not count: the median of four moves with two of them, that of three moves with none.
+/// not count: the median of four moves with two of them, and of three that are left one has moved.
 fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {

@@ -99,7 +99,8 @@ impl Surfaces {
 
     /// The opaque triangles of an item, as the only item.
     ///
-    /// The one-sided of them where all of them are not closed. Points of one place are one point: files have several, for each normal one.
+    /// Only the one-sided of them where all of them are not closed. Points of one place are one
+    /// point: files have several, one for each normal.
     ///
     /// # Panics
     /// If there is no such item.
