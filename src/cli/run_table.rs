@@ -279,23 +279,28 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
 ///
-/// Those of two scenes or paths differ.
+/// Where two would be the same, they are cut where they differ.
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
-    let shown = |of: fn(&GroupKey) -> &String| {
-        let names: Vec<String> = keys.iter().map(|key| of(key).clone()).collect();
-        distinct(
-            &names,
-            |name| short(name),
-            |name| about_difference(name, &names),
-        )
+    labels_of(&keys)
+}
+
+fn labels_of(keys: &[GroupKey]) -> Vec<String> {
+    type Part = fn(&GroupKey) -> &String;
+    const PARTS: [Part; 3] = [|key| &key.scene, |key| &key.path, |key| &key.motion];
+    let of = |key: &GroupKey, show: &dyn Fn(Part, &String) -> String| {
+        let parts = PARTS.map(|part| show(part, part(key)));
+        parts.join(" ").trim_end().to_owned()
     };
-    let [scenes, paths] = [shown(|key| &key.scene), shown(|key| &key.path)];
-    let parts = scenes.into_iter().zip(paths).zip(shown(|key| &key.motion));
-    let label = |((scene, path), motion)| format!("{scene} {path} {motion}");
-    parts
-        .map(|parts| label(parts).trim_end().to_owned())
-        .collect()
+    let differing = |part: Part, name: &String| {
+        let all: Vec<String> = keys.iter().map(|key| part(key).clone()).collect();
+        about_difference(name, &all)
+    };
+    distinct(
+        keys,
+        |key| of(key, &|_, name| short(name)),
+        |key| of(key, &differing),
+    )
 }
 
 /// A name; if it is long, its beginning and the part that differs.
@@ -447,6 +452,25 @@ pub fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_are_short_unless_two_are_the_same() {
+        let key = |scene: &str, path: &str| GroupKey {
+            scene: scene.to_owned(),
+            path: path.to_owned(),
+            ..GroupKey::default()
+        };
+        let [fly, longer] = [128, 512].map(|n| format!("flythrough:frames={n},visible=2%"));
+        // Paths of other scenes do not matter.
+        let apart = [key("city:n=100000", &fly), key("helsinki", &longer)];
+        let short = ["city 100k flythrough 2 %", "helsinki flythrough 2 %"];
+        assert_eq!(labels_of(&apart), short);
+        let alike = labels_of(&[key("helsinki", &fly), key("helsinki", &longer)]);
+        assert_eq!(
+            alike,
+            [format!("helsinki {fly}"), format!("helsinki {longer}")]
+        );
+    }
 
     #[test]
     fn long_names_are_cut_where_they_differ() {
