@@ -279,7 +279,7 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
 ///
-/// Where two would be the same, they are cut where they differ.
+/// Two that would be the same are cut where they differ.
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
     labels_of(&keys)
