@@ -116,6 +116,11 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
     if !missing.is_empty() {
         found = format!("{found} {}", missing.join(", "));
     }
+    let word = found.split('\'').nth(1).unwrap_or_default();
+    let is_scene = usage.as_ref().is_some_and(|usage| !usage.contains('<'));
+    if error.kind() == ErrorKind::UnknownArgument && is_scene && Path::new(word).is_file() {
+        expected = Some(format!("; did you mean '--scene {word}'?"));
+    }
     let usage = usage.map(|usage| format!("; expected {usage}"));
     let help = "; see --help".to_owned();
     Some(found + &expected.or(usage).unwrap_or(help))

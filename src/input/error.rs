@@ -1,11 +1,11 @@
 //! Errors in files and texts of users, each one line: where, found, expected.
 
 use std::fmt::Display;
-use std::io;
 use std::path::Path;
+use std::{fs, io};
 
 use crate::shown::{expected_by, kind_of, plain};
-use crate::spec::SpecError;
+use crate::spec::{SpecError, nearest};
 
 /// A result of reading a user's input.
 pub type Result<T, E = InputError> = std::result::Result<T, E>;
@@ -55,13 +55,25 @@ impl InputError {
     pub fn io(path: &Path, what: &str) -> impl Fn(io::Error) -> InputError + Copy {
         move |error| {
             let source = bare(error);
-            let expected = expected_by(&source, what);
+            let expected = expected_by(&source, what) + &alike(path, &source).unwrap_or_default();
             InputError {
                 text: plain(&format!("{}: {source}{expected}", path.display())),
                 source: Some(source),
             }
         }
     }
+}
+
+/// "; did you mean 'city.csv'?" where a folder has nearly that name.
+fn alike(path: &Path, error: &io::Error) -> Option<String> {
+    if kind_of(error) != io::ErrorKind::NotFound {
+        return None;
+    }
+    let files = fs::read_dir(Path::new(".").join(path).parent()?).ok()?;
+    let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
+    let (names, name) = (names.collect::<Vec<_>>(), path.file_name()?.to_str()?);
+    let name = nearest(name, names.iter().map(String::as_str))?;
+    Some(format!("; did you mean '{name}'?"))
 }
 
 impl From<SpecError> for InputError {

@@ -36,10 +36,7 @@ impl Labels {
     /// Zero bytes, which no CSV file may have, become replacement characters.
     pub fn push(&mut self, value: &str) {
         let known = self.numbers.get(value).copied();
-        // Triangles of one object follow each other.
-        let last = self.of_item.last().copied();
-        let same = last.filter(|&number| self.text(number as usize) == value);
-        let number = known.or(same).unwrap_or_else(|| {
+        let number = known.unwrap_or_else(|| {
             let number = self.ends.len() as u32;
             self.texts += &value.replace('\0', "\u{fffd}");
             self.ends.push(self.texts.len());
@@ -49,6 +46,14 @@ impl Labels {
             number
         });
         self.of_item.push(number);
+    }
+
+    /// The labels of some of the items, any of them several times.
+    pub fn of(&self, items: impl Iterator<Item = usize>) -> Labels {
+        Labels {
+            of_item: items.map(|item| self.of_item[item]).collect(),
+            ..self.clone()
+        }
     }
 
     fn text(&self, number: usize) -> &str {
@@ -69,7 +74,11 @@ impl Labels {
             counts[number as usize] += 1;
         }
         let mut rows: BTreeMap<&str, usize> = BTreeMap::new();
-        for (number, count) in counts.into_iter().enumerate() {
+        for (number, count) in counts
+            .into_iter()
+            .enumerate()
+            .filter(|(_, count)| *count > 0)
+        {
             *rows.entry(self.text(number)).or_default() += count;
         }
         let mut rows: Vec<(&str, usize)> = rows.into_iter().collect();
@@ -90,6 +99,11 @@ mod tests {
         }
         assert_eq!((kind.get(1), kind.get(9)), ("road", ""));
         assert_eq!(kind.histogram(), [("tree", 2), ("road", 1)]);
+        let trees = kind.of([0, 0, 2].into_iter());
+        assert_eq!(
+            (trees.get(1), trees.histogram()),
+            ("tree", vec![("tree", 3)])
+        );
     }
 
     #[test]
@@ -97,18 +111,13 @@ mod tests {
         let mut id = Labels::new("id");
         let count = 2 * MOST_KNOWN;
         (0..count).for_each(|i| id.push(&i.to_string()));
-        for value in ["a\0b", "8000", "8000"] {
+        for value in ["a\0b", "8000"] {
             id.push(value);
         }
         let own = [id.get(count - 1), id.get(count), id.get(count + 1)];
         assert_eq!(own, ["8191", "a\u{fffd}b", "8000"]);
-        assert_eq!(
-            id.ends.len(),
-            count + 2,
-            "a text that follows itself is kept once"
-        );
         let histogram = id.histogram();
         assert_eq!(histogram.len(), count + 1);
-        assert_eq!(histogram[..2], [("8000", 3), ("0", 1)]);
+        assert_eq!(histogram[..2], [("8000", 2), ("0", 1)]);
     }
 }

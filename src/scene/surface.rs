@@ -3,6 +3,7 @@
 //! It defines the form and its checks; where triangles come from is in `meshes`.
 
 use std::collections::HashMap;
+use std::iter;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -305,8 +306,6 @@ impl Scene {
         let count = surfaces.triangles.len() as u64;
         options.check_fits(&self.name, Some(count), count)?;
         let mut single = Surfaces::about(surfaces.origin);
-        let empty = |labels: &Labels| Labels::new(labels.column.clone());
-        let mut labels: Vec<Labels> = self.labels.iter().map(empty).collect();
         let mut boxes = Vec::with_capacity(surfaces.triangles.len());
         for item in 0..surfaces.items() {
             for triangle in surfaces.of_item[item].clone() {
@@ -314,15 +313,17 @@ impl Scene {
                 let (kind, two_sided) = (surfaces.kinds[at], surfaces.two_sided[at]);
                 single.push(kind, two_sided, &surfaces.corners(triangle), &[[0, 1, 2]]);
                 boxes.push(surfaces.world_box(&(triangle..triangle + 1)));
-                for (own, all) in labels.iter_mut().zip(&self.labels) {
-                    own.push(all.get(item));
-                }
             }
         }
+        let counts = surfaces.of_item.iter().map(|triangles| triangles.len());
+        let items = counts
+            .enumerate()
+            .flat_map(|(item, count)| iter::repeat_n(item, count));
+        let labels = self.labels.iter().map(|labels| labels.of(items.clone()));
         Ok(Scene {
             up: self.up,
             unit: self.unit,
-            labels,
+            labels: labels.collect(),
             places: self.places,
             animation: self.animation,
             surfaces: Some(Arc::new(single)),

@@ -89,6 +89,14 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         ("run --sead 3", "'--sead' | did you mean '--seed'"),
         (
+            "run scene.csv",
+            "'scene.csv' | did you mean '--scene scene.csv'",
+        ),
+        (
+            "run --scene scenes.csv",
+            "scenes.csv | existing file; did you mean 'scene.csv'",
+        ),
+        (
             "run --seed x --out new",
             "--seed is 'x'; expected a whole number from 0 to 18446744073709551615",
         ),

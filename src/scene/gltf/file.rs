@@ -201,7 +201,8 @@ impl<'f> File<'f> {
             let found = format!("'{}'", shortened(uri, 60));
             return Err(error(&found, "a file beside this one"));
         }
-        beside(&decoded(uri))
+        let place = format!("{}, buffers[{buffer}].uri", self.name);
+        beside(&decoded(uri)).map_err(|found| InputError::new(format_args!("{place}: {found}")))
     }
 
     pub fn error(&self, place: impl Display, found: impl Display, expected: &str) -> InputError {
