@@ -246,48 +246,53 @@ fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
 fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let unlike = cameras.iter().filter_map(|camera| {
+    let axes = |camera: &Camera| {
         let found = camera.lens.matrix().map(ViewProjection::unprojected);
         let found = found.transpose().ok()?;
         let frame = found.map_or(camera.frame, |found| found.camera.frame);
-        let [across, along] = [frame.u(), frame.v()].map(|own| own.dot(scene.up.vector()));
         // A mirrored image may have y downward.
         let is_mirrored = found.is_some_and(|found| found.is_mirrored);
-        let along = if is_mirrored { along.abs() } else { along };
-        // Straight up or down there is no roll.
-        let is_level = across.hypot(along) > 0.1;
-        (!is_level || along < across.abs()).then_some((is_level, frame.v()))
-    });
-    let unlike: Vec<(bool, DVec3)> = unlike.collect();
-    let rolled = || unlike.iter().filter(|(is_level, _)| *is_level);
-    let ((_, first), own) = (rolled().next()?, scene.up.name());
-    let along = |axis: UpAxis, up: &DVec3| up.dot(axis.vector()).abs();
-    let is_along = |axis: &UpAxis| {
-        let sum: f64 = rolled().map(|(_, up)| along(*axis, up)).sum();
-        sum > 0.7 * rolled().count() as f64
+        Some((frame.u(), frame.v(), is_mirrored))
     };
-    Some(match UpAxis::ALL.into_iter().find(is_along) {
-        Some(other) if other != scene.up => {
-            let is_up = |(_, up): &&(bool, DVec3)| along(other, up) > 0.7;
-            let count = unlike.iter().filter(is_up).count();
-            let (what, other, name) = (share(count, cameras), other.name(), &scene.name);
-            // Formats that state an axis state a unit as well.
-            let is_advised = scene.unit.is_none() && 2 * count >= cameras.len();
-            let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
-            let advice = advice.unwrap_or_default();
-            format!("{other} is up in {what}, {own} in {name}{advice}")
-        }
-        _ => {
-            let what = share(rolled().count(), cameras);
-            // -0 is 0.
-            let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
-            format!(
-                "{what} rolled by more than 45 degrees, first with ({x:.3}, {y:.3}, {z:.3}) up; \
+    let all: Vec<(DVec3, DVec3, bool)> = cameras.iter().filter_map(axes).collect();
+    let against = |axis: UpAxis, (u, v, is_mirrored): &(DVec3, DVec3, bool)| {
+        let [across, along] = [u, v].map(|own| own.dot(axis.vector()));
+        // Straight up or down there is no roll.
+        let is_known = across.hypot(along) > 0.1;
+        let along = if *is_mirrored { along.abs() } else { along };
+        is_known.then_some((across.abs(), along))
+    };
+    let is_rolled = |axes: &&_| against(scene.up, axes).is_some_and(|(a, b)| b < a);
+    // Of a camera that is not rolled the horizon is level.
+    let is_level = |axis, axes: &_| against(axis, axes).is_some_and(|(a, b)| a < 0.1 && b > 0.0);
+    let rolled = || all.iter().filter(is_rolled);
+    let (first, own) = (rolled().next()?.1, scene.up.name());
+    let count = |axis| all.iter().filter(|axes| is_level(axis, axes)).count();
+    let is_up = |axis: &UpAxis| rolled().filter(|axes| is_level(*axis, axes)).count();
+    let mut others = UpAxis::ALL.into_iter().filter(|axis| *axis != scene.up);
+    Some(
+        match others.find(|axis| 2 * is_up(axis) > rolled().count()) {
+            Some(other) => {
+                let count = count(other);
+                let (what, other, name) = (share(count, cameras), other.name(), &scene.name);
+                // Formats that state an axis state a unit as well.
+                let is_advised = scene.unit.is_none() && 2 * count >= cameras.len();
+                let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
+                let advice = advice.unwrap_or_default();
+                format!("{other} is up in {what}, {own} in {name}{advice}")
+            }
+            None => {
+                let what = share(rolled().count(), cameras);
+                // -0 is 0.
+                let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
+                format!(
+                    "{what} rolled by more than 45 degrees, first with ({x:.3}, {y:.3}, {z:.3}) up; \
                  {own} is up in {}",
-                scene.name
-            )
-        }
-    })
+                    scene.name
+                )
+            }
+        },
+    )
 }
 
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.

@@ -14,8 +14,8 @@ use super::ibsp::{is_ibsp, read_ibsp};
 use super::obj::{is_obj, read_obj};
 use super::zip::{self, is_zip};
 use super::{
-    FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, WadMap,
-    boxes_csv, map_names,
+    FAMILIES, Family, ItemKind, LoadOptions, MESHES, Regions, SAMPLES, Sample, Scene, UpAxis,
+    WadMap, WorldBox, boxes_csv, map_names,
 };
 use crate::input::{InputError, Result, is_readable, note, note_counted, read_file};
 use crate::shown::{plain, shortened};
@@ -99,6 +99,18 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
         let (name, own, up) = (&scene.name, scene.up.name(), up.name());
         let what = format_args!("{own} is up by its format; --up {up} is for boxes CSV and OBJ");
         note(&format!("{name}: {what}"));
+    }
+    // Formats that state an axis state a unit as well.
+    if options.up.is_none() && scene.unit.is_none() {
+        let WorldBox { min, max } = scene.world_bounds();
+        let along = |axis: UpAxis| (max - min).dot(axis.vector());
+        let is_flat = |axis: &UpAxis| 4.0 * along(*axis) < (max.x - min.x).min(along(scene.up));
+        if let Some(flat) = UpAxis::ALL.into_iter().find(is_flat) {
+            let (name, up, flat) = (&scene.name, scene.up.name(), flat.name());
+            let what =
+                format_args!("flat along {flat}; --up {flat} if that is up, --up {up} if not");
+            note(&format!("{name}: {what}"));
+        }
     }
     Ok(scene)
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{Labels, LoadOptions, Regions, Scene, WorldBox};
+use super::{LoadOptions, Regions, Scene, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::Result;
 use crate::spec::SpecError;

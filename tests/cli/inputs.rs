@@ -148,6 +148,17 @@ fn every_command_that_reads_a_scene_takes_up() {
     assert_eq!((said.code, said.out), (Some(0), works(folder.path(), line)));
     let wanted = "note: freedm-map12: z is up by its format; --up y is for boxes CSV and OBJ\n";
     assert_eq!(said.err, wanted);
+    // What does not may be flat along the other axis.
+    let header = "min_x,min_y,min_z,max_x,max_y,max_z";
+    std::fs::write(
+        folder.path().join("f.csv"),
+        format!("{header}\n0,0,0,9,2,9\n"),
+    )
+    .unwrap();
+    let told = ["", " --up y", " --up z"]
+        .map(|up| cullbench(folder.path(), &format!("scene info f.csv{up}")).err);
+    let wanted = "note: f.csv: flat along y; --up y if that is up, --up z if not\n";
+    assert_eq!(told, [wanted, "", ""]);
     // Coordinates are not turned.
     let done = cullbench(folder.path(), "scene convert y.csv --up y");
     let kept = std::fs::read_to_string(folder.path().join("y.csv")).expect("a scene");
