@@ -71,21 +71,25 @@ impl CompareTable<'_> {
             other => other.replace('_', " "),
         };
         let shifts = self.changes.proven_shifts();
-        let shift = text::some(shifts.first(), |first| {
-            let metric = first.metric;
+        let shift = text::some(shifts.first(), |_| {
             // The shift alone may leave it open.
             let is_open = verdict == "inconclusive";
-            let whole = match is_open && self.changes.count(Outcome::Inconclusive) == 0 {
-                true => format!("as a whole; {metric} changed"),
-                false => format!("among the structures; {metric} as a whole changed"),
+            let among = match is_open && self.changes.count(Outcome::Inconclusive) == 0 {
+                true => ";",
+                false => " among the structures;",
             };
             let of = |(n, shift): (usize, &&CommonShift)| {
-                let metric = if n == 0 { &whole } else { shift.metric };
-                format!("{metric} by {}", change_of(shift.ratio, None))
+                let of = match &shift.group {
+                    Some(group) => format!("of {}", place(group, usize::MAX, text::plain)),
+                    None => "as a whole".to_owned(),
+                };
+                let changed = ["", " changed"][usize::from(n == 0)];
+                let change = change_of(shift.ratio, None);
+                format!("{} {of}{changed} by {change}", shift.metric)
             };
             let all: Vec<String> = shifts.iter().enumerate().map(of).collect();
             let all = all.join(" and ");
-            format!(" {all}, which is not judged here (use compare --against)")
+            format!("{among} {all}, which is not judged here (use compare --against)")
         });
         let worst = self.changes.rows.first();
         let worst = worst.filter(|_| self.verdict().0 != Ending::Ok);
@@ -264,7 +268,10 @@ impl CompareTable<'_> {
                 Some(usize::MAX) => vec![structure.clone(), place],
                 Some(_) => vec![short_structure(structure), place],
             };
-            let is_shifted = shifts.iter().any(|shift| Some(shift.metric) == row.metric);
+            let is_shifted = shifts.iter().any(|shift| {
+                let is_of = |group: &GroupKey| *group == row.cell.group;
+                Some(shift.metric) == row.metric && shift.group.as_ref().is_none_or(is_of)
+            });
             let than_what = match row.outcome {
                 Outcome::Slower | Outcome::Faster if is_shifted => " than the others",
                 _ => "",
@@ -408,7 +415,13 @@ fn shift_line(shift: &CommonShift) -> String {
     let is_open = shift.lower <= Some(1.0) && shift.upper >= Some(1.0);
     let unknown = "; this comparison cannot tell the machine from the program";
     let why = if is_open { "" } else { unknown };
-    format!("as a whole {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}")
+    match &shift.group {
+        Some(group) => format!(
+            "{}: beside the other scenes {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}",
+            place(group, usize::MAX, text::plain)
+        ),
+        None => format!("as a whole {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}"),
+    }
 }
 
 /// "work changed: bvh on city, ...: items_tested 1200 to 1111 (-7.4 %)".

@@ -13,7 +13,7 @@ use super::ranking::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
 use crate::measure::{GroupKey, Machine, Status, Toolchain};
 use crate::shown::number;
-use crate::statistics::{Judgement, judge, judge_unpaired, median, trimmed_mean};
+use crate::statistics::{Change, Judgement, judge, judge_unpaired, median, trimmed_mean};
 
 /// Fewer other structures cannot tell which of them moved: the median of three
 /// stays where it is when one of them moves, that of two does not.
@@ -72,8 +72,10 @@ pub fn changes(
             true => by_work(&own, metric, threshold),
             false => by_metric(basis, &own, metric, threshold),
         });
-        let shift = common_shift(&own, metric).filter(|_| basis == Basis::Reports);
-        found.common_shifts.extend(shift);
+        if basis == Basis::Reports {
+            let shifts = common_shifts(&own, metric, threshold);
+            found.common_shifts.extend(shifts);
+        }
     }
     found.rows.sort_by(JudgedRow::order);
     found
@@ -338,9 +340,9 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
     (!whys.is_empty()).then(|| whys.join(", "))
 }
 
-/// Per process, the mean over the groups of the median over the structures;
-/// `None` without a cell that both have timed.
-fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
+/// Per process, the median over the groups of their medians over the structures; then the
+/// groups that moved relative to it. Nothing without a cell that both have timed.
+fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<CommonShift> {
     let timed = pairs.iter().filter_map(|&pair| {
         let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
         let logs = logs(pair, metric).filter(|_| is_ok)?;
@@ -352,26 +354,52 @@ fn common_shift(pairs: &[Pair], metric: &'static str) -> Option<CommonShift> {
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
     let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);
     let whole = groups.iter();
-    let whole = whole.map(|group| group.1.iter().filter(is_whole).collect());
-    let whole: Vec<Vec<&Logs>> = whole.filter(|cells: &Vec<_>| !cells.is_empty()).collect();
-    let of = |side: usize| -> Vec<f64> {
-        let process = |process: usize| -> f64 {
-            let medians = whole.iter().filter_map(|cells| {
-                let logs = cells.iter().map(|logs| logs[side][process]);
-                median(&logs.collect::<Vec<f64>>())
-            });
-            medians.sum::<f64>() / whole.len() as f64
-        };
-        (0..counts[side]).map(process).collect()
+    let whole = whole.map(|(key, cells)| (key, Vec::from_iter(cells.iter().filter(is_whole))));
+    let whole: Vec<(&GroupKey, Vec<&Logs>)> = whole.filter(|group| !group.1.is_empty()).collect();
+    let middle = |cells: &[&Logs]| {
+        [0, 1].map(|side| {
+            let process = |process| median(&Vec::from_iter(cells.iter().map(|c| c[side][process])));
+            (0..counts[side]).filter_map(process).collect()
+        })
     };
-    let found = judge_unpaired(&[of(0)], &[of(1)], &[((), ())], 0.0)[0]?;
-    Some(CommonShift {
+    let own: Vec<Logs> = whole.iter().map(|(_, cells)| middle(cells)).collect();
+    let common: Logs = middle(&Vec::from_iter(&own));
+    let judged = |shifts: &[Logs], threshold| {
+        let [was, is] = [0, 1].map(|side| Vec::from_iter(shifts.iter().map(|s| s[side].clone())));
+        let names: Vec<((), usize)> = (0..shifts.len()).map(|group| ((), group)).collect();
+        judge_unpaired(&was, &is, &names, threshold)
+    };
+    let shift = |group: Option<&GroupKey>, found: Judgement, cells| CommonShift {
+        group: group.cloned(),
         metric,
         ratio: found.ratio,
         lower: found.lower,
         upper: found.upper,
-        cells: whole.iter().map(Vec::len).sum(),
-    })
+        cells,
+    };
+    let cells = whole.iter().map(|group| group.1.len()).sum();
+    let as_a_whole = judged(&[common.clone()], 0.0)[0].map(|found| shift(None, found, cells));
+    let relative = own.iter().map(|own| {
+        let less = |side: usize| {
+            own[side]
+                .iter()
+                .zip(&common[side])
+                .map(|(own, all)| own - all)
+        };
+        [0, 1].map(|side| less(side).collect())
+    });
+    // The median of two moves with either.
+    let relative = relative.filter(|_| whole.len() >= LEAST_OTHERS);
+    let judged = judged(&relative.collect::<Vec<_>>(), threshold);
+    let moved = whole
+        .iter()
+        .zip(judged)
+        .filter_map(|((group, cells), found)| {
+            let found =
+                found.filter(|found| matches!(found.change, Change::Slower | Change::Faster))?;
+            Some(shift(Some(group), found, cells.len())).filter(|_| cells.len() >= LEAST_OTHERS)
+        });
+    as_a_whole.into_iter().chain(moved).collect()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 
 use serde::Serialize;
 
-use crate::measure::{CellKey, Status};
+use crate::measure::{CellKey, GroupKey, Status};
 use crate::statistics::{Change, Judgement};
 
 /// The metrics with a value per process, which a judgement needs; less is better.
@@ -196,8 +196,10 @@ pub struct Lone {
 }
 
 /// Shift of all structures at once: the machine, or the program as a whole.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CommonShift {
+    /// The only group that it is of, relative to the others.
+    pub group: Option<GroupKey>,
     /// Metric whose times are compared.
     pub metric: &'static str,
     /// new / old: above 1 is slower.
@@ -225,7 +227,9 @@ pub struct Changes {
     pub only_in_old: Vec<Lone>,
     /// Cells that only the new report has.
     pub only_in_new: Vec<Lone>,
-    /// Shift of each metric between two reports; none of programs that ran in turns.
+    /// Shifts of each metric between two reports; none of programs that ran in turns.
+    ///
+    /// First of all groups, then of each that is proven to have moved relative to the others.
     pub common_shifts: Vec<CommonShift>,
 }
 

@@ -68,7 +68,7 @@ fn json_says_the_same_with_types() {
     );
     assert_eq!(done["only_in_new"], json!([]));
     let shift = &done["common_shifts"][0];
-    assert_eq!(keys(shift), set("metric ratio lower upper cells"));
+    assert_eq!(keys(shift), set("group metric ratio lower upper cells"));
     assert_eq!(shift["cells"], json!(9));
     let same = json(&works(
         folder.path(),

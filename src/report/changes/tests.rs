@@ -80,7 +80,7 @@ fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
         assert_eq!(found.count(Outcome::Same), 4, "{:?}", outcomes(&found));
         assert_eq!(found.is_regression(), wanted == Outcome::Slower);
         // What moved all of them is said of all of them.
-        let shift = found.common_shifts[0];
+        let shift = &found.common_shifts[0];
         assert!(shift.lower < Some(1.5) && Some(1.5) < shift.upper);
         assert_eq!(shift.cells, 5);
     }
@@ -266,6 +266,35 @@ fn every_metric_has_its_common_shift() {
                 .is_empty()
         );
     }
+}
+
+#[test]
+fn a_scene_that_moved_as_a_whole_is_named() {
+    let (mut old, mut new) = (Vec::new(), Vec::new());
+    for (scene, factor) in [("s", 1.0), ("t", 1.0), ("u", 2.0), ("v", 1.0)] {
+        for (cells, factor) in [(&mut old, 1.0), (&mut new, factor)] {
+            let mut all = all(10, factor).cells;
+            all.iter_mut()
+                .for_each(|cell| cell.scene.name = scene.to_owned());
+            cells.extend(all);
+        }
+    }
+    let found = changes(Basis::Reports, [&old, &new], 0.05, QUERY);
+    assert_eq!(found.count(Outcome::Same), 20, "{:?}", outcomes(&found));
+    let [whole, scene] = &found.common_shifts[..] else {
+        panic!("{:?}", found.common_shifts);
+    };
+    assert!(
+        whole.group.is_none() && (whole.ratio - 1.0).abs() < 0.01,
+        "{whole:?}"
+    );
+    assert_eq!(scene.group.as_ref().unwrap().scene, "u");
+    assert!(
+        (scene.ratio - 2.0).abs() < 0.01 && scene.cells == 5,
+        "{scene:?}"
+    );
+    let same = changes(Basis::Reports, [&old, &old], 0.05, QUERY);
+    assert_eq!(same.common_shifts.len(), 1);
 }
 
 /// Copies of a figure would prove more than was seen.
