@@ -4,13 +4,15 @@
 //! [`changes`]; here are the options and how the pairs are run.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, Result, bail};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde_json::json;
+use serde::Deserialize;
+use serde_json::{Value, json};
 
 use super::command_args::{CompareArgs, Gate};
 use super::compare_table::{CompareTable, Side};
@@ -22,8 +24,10 @@ use super::study::{progress, tell_progress};
 use super::{interrupt, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
-use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share};
-use crate::report::{Basis, Changes, ReportCell, WORK, changes, grouped};
+use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share, Toolchain};
+use crate::report::{
+    Basis, Changes, ReportCell, Setting, WORK, built_differently, changes, grouped,
+};
 use crate::scene;
 use crate::statistics::resolved;
 
@@ -74,14 +78,17 @@ pub fn compare_against<'a>(
     let (changes, head) = duel.run()?;
     let note = |busy| format!("{busy}: both sides suffered alike, and it may take more pairs");
     let left_out = left_out(registry, &args.what, &plan)?;
+    let differences = |other| built_differently(&other, &Toolchain::capture());
+    let settings = toolchain(binary).map(differences).unwrap_or_default();
+    let told = settings.iter().map(Setting::to_string);
     Ok(CompareTable {
         args,
         old,
         new,
         basis: Basis::Pairs,
         head,
-        notes: busy.map(note).into_iter().chain(left_out).collect(),
-        settings: Vec::new(),
+        notes: told.chain(busy.map(note)).chain(left_out).collect(),
+        settings,
         changes,
     })
 }
@@ -126,6 +133,15 @@ fn side(program: &Path) -> Result<Side> {
         line: format!("{}, digest {digest:.12}", program.display()),
         json: json!({ "program": program.display().to_string(), "digest": digest }),
     })
+}
+
+/// Toolchain of a program, by its own words.
+fn toolchain(program: &Path) -> Option<Toolchain> {
+    let told = Command::new(program)
+        .args(["env", "--format", "json"])
+        .output();
+    let told: Value = serde_json::from_slice(&told.ok()?.stdout).ok()?;
+    Toolchain::deserialize(&told["toolchain"]).ok()
 }
 
 /// The options of `run` that were typed behind `compare`.

@@ -89,8 +89,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
 
 /// Lines before the figures.
 fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<String> {
-    let told = |s: &Setting| format!("{} differs: {} '{}' and '{}'", s.of, s.what, s.old, s.new);
-    let mut notes: Vec<String> = settings.iter().map(told).collect();
+    let mut notes: Vec<String> = settings.iter().map(Setting::to_string).collect();
     if gate == Gate::Time && settings.iter().any(|setting| setting.is_machine) {
         notes.push(
             "different machines: a verdict says how a structure stands among the others there, \

@@ -352,7 +352,8 @@ impl CompareTable<'_> {
         let judged = self.changes.rows.iter().filter_map(|row| row.judgement);
         let undecided = judged.filter(|found| found.change == Change::Inconclusive);
         let undecided: Vec<Judgement> = undecided.collect();
-        let is_hopeless = |found: &Judgement| found.lower.is_some() && found.more_pairs.is_none();
+        let is_hopeless = |found: &&Judgement| found.lower.is_some() && found.more_pairs.is_none();
+        let hopeless = undecided.iter().filter(is_hopeless).count();
         let is_stopped = |side: &Side| side.json.get("finished_at") == Some(&Value::Null);
         let told = match (self.basis, more) {
             _ if is_stopped(&self.old) || is_stopped(&self.new) => {
@@ -362,7 +363,7 @@ impl CompareTable<'_> {
                 format!("about {} would decide", text::counted(more, "more pair"))
             }
             (Basis::Pairs, None) => "more pairs would not decide".to_owned(),
-            (Basis::Reports, _) if undecided.iter().any(is_hopeless) => {
+            (Basis::Reports, _) if hopeless > 0 && hopeless == undecided.len() => {
                 "more processes would not decide: run both again, or compare --against BINARY"
                     .to_owned()
             }
@@ -377,9 +378,11 @@ impl CompareTable<'_> {
                     }
                     _ => "finer runs, perhaps with --processes 20,".to_owned(),
                 };
+                let of_them = text::count(undecided.len() - hopeless) + " of them";
+                let of_them = text::some((hopeless > 0).then_some(of_them), |n| format!(" {n}"));
                 format!(
-                    "{runs} would decide, or compare --against BINARY, which runs both programs \
-                     in turns"
+                    "{runs} would decide{of_them}, or compare --against BINARY, which runs both \
+                     programs in turns"
                 )
             }
         };

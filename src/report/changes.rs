@@ -423,7 +423,7 @@ pub struct Setting {
 impl fmt::Display for Setting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (of, what, old, new) = (self.of, self.what, &self.old, &self.new);
-        write!(f, "{of} differs: {what} '{old}', and '{new}'")
+        write!(f, "{of} differs: {what} '{old}' and '{new}'")
     }
 }
 
@@ -466,6 +466,12 @@ pub(super) fn differences(old: Vec<Fact>, new: Vec<Fact>) -> impl Iterator<Item 
         new,
         is_machine,
     })
+}
+
+/// Differing facts of two programs on this machine.
+pub fn built_differently(old: &Toolchain, new: &Toolchain) -> Vec<Setting> {
+    let machine = Machine::capture();
+    differences(facts(&machine, old), facts(&machine, new)).collect()
 }
 
 /// Differing facts, in the order of the report.

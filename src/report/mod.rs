@@ -18,7 +18,7 @@ mod writing;
 pub use crate::measure::{ReportCell, SamplesRef, TwinEntry};
 pub use crate::statistics::{Change, Estimate, Judgement, Trimmed};
 pub(crate) use changes::FEW_OTHERS;
-pub use changes::{Basis, Setting, changes, settings};
+pub use changes::{Basis, Setting, built_differently, changes, settings};
 pub use experiment::Experiment;
 pub(crate) use folder::save_page;
 pub use folder::{RunFolder, StoppedRun, save_report};

@@ -273,6 +273,32 @@ fn two_programs_are_compared_by_their_counters_alone() {
     );
 }
 
+/// Another program's build is asked of it.
+#[cfg(unix)]
+#[test]
+fn programs_that_are_built_differently_are_told() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = folder(&[]);
+    let other = folder.path().join("other");
+    let script = format!(
+        "#!/bin/sh\nif [ \"$1\" = env ]; then\n  {0} \"$@\" | sed 's/\"opt_level\": \".\"/\"opt_level\": \
+         \"9\"/'\nelse\n  exec {0} \"$@\"\nfi\n",
+        super::PROGRAM
+    );
+    fs::write(&other, script).expect("written");
+    fs::set_permissions(&other, fs::Permissions::from_mode(0o755)).expect("executable");
+    let line = "compare --scene uniform:n=50 --path orbit:frames=4 --structure linear,bvh \
+        --gate work --against ./other";
+    let text = unwrapped(&works(folder.path(), line));
+    assert!(
+        text.contains("note: toolchain differs: opt-level '9' and '"),
+        "{text}"
+    );
+    let all = json(&works(folder.path(), &format!("{line} --format json")));
+    assert_eq!(all["settings"].as_array().map(Vec::len), Some(1), "{all}");
+}
+
 #[test]
 fn two_programs_are_compared_by_their_frames() {
     let folder = folder(&[]);
