@@ -333,7 +333,7 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     };
     let (stencil, with) = test(STENCIL)?;
     let (other, without) = test(default_test(report.cut_outs.is_some()))?;
-    if without == 0.0 {
+    if without == 0.0 || with == without {
         return None;
     }
     Some(format!(

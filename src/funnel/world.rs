@@ -349,13 +349,16 @@ fn check_options(input: &FunnelInput) -> Result<()> {
 /// Regions of the scene.
 fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
     let scene = &input.setting.scene;
+    // A table of all pairs is large.
+    let is_read = input.all || ![NONE, PORTAL_RECT].contains(&input.chain.of(StageKind::Region));
     let listed = match &scene.regions {
         scene::Regions::Bsp(map) if !map.reject.is_empty() => map.sectors.len() as u64,
         scene::Regions::Leaves(map) if map.sees().is_some() => map.clusters as u64,
         _ => 0,
     };
+    let listed = listed * u64::from(is_read);
     check_memory(&scene.name, BYTES_PER_PAIR * listed.saturating_pow(2))?;
-    Ok(Regions::of(scene))
+    Ok(Regions::of(scene, is_read))
 }
 
 /// Rooms of a scene, or sectors or clusters of its map.
@@ -371,10 +374,16 @@ pub struct Regions {
 impl Regions {
     /// Back ends of a scene; `None` without regions, and for a map whose linedefs
     /// contradict each other.
-    pub fn of(scene: &Scene) -> Option<Regions> {
+    pub fn of(scene: &Scene, with_table: bool) -> Option<Regions> {
         let (graph, table) = match (DoomMap::of_scene(scene), &scene.regions) {
-            (Some(map), _) => (map.graph().ok()?, map.reject()),
-            (None, scene::Regions::Leaves(map)) => (RegionGraph::of_quake(map), Pvs::of_quake(map)),
+            (Some(map), _) => (
+                map.graph().ok()?,
+                with_table.then(|| map.reject()).flatten(),
+            ),
+            (None, scene::Regions::Leaves(map)) => (
+                RegionGraph::of_quake(map),
+                with_table.then(|| Pvs::of_quake(map)).flatten(),
+            ),
             (None, _) => (RegionGraph::of_scene(scene)?, None),
         };
         Some(Regions {

@@ -19,7 +19,7 @@ use crate::statistics::{Change, Judgement, judge, judge_unpaired, median, trimme
 /// stays where it is when one of them moves, that of two does not.
 const LEAST_OTHERS: usize = 3;
 /// Reason of a cell that has fewer others.
-pub const FEW_OTHERS: &str = "under three other structures in both reports to compare with";
+pub const FEW_OTHERS: &str = "under three other structures with as many processes in both reports";
 /// Fewer processes have no interval.
 const LEAST_PROCESSES: usize = 3;
 

@@ -15,6 +15,7 @@
 mod solid;
 mod surfaces;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -39,6 +40,8 @@ pub struct DoomMap {
     /// Heights of floor and ceiling of each sector, in file order; beyond all others
     /// where the sector moves.
     pub sectors: Vec<[f64; 2]>,
+    /// The linedefs about each sector, which lies on the right of each.
+    edges: Vec<Vec<[[i32; 2]; 2]>>,
 }
 
 /// Tests for an action that opens or moves the sector behind its own line.
@@ -72,23 +75,36 @@ impl DoomMap {
         }
     }
 
-    /// Finds the sectors that move. O(linedefs * sectors).
+    /// Finds the sectors that move, and the linedefs about each. O(linedefs + sectors).
     pub fn of(file: Arc<WadMap>) -> DoomMap {
-        let is_moved = |tag: u16, sector: u32| {
-            let moves = |line: &Linedef| {
-                let is_tagged = line.tag != 0 && line.tag == tag && !is_still(line.action);
-                is_tagged || is_door(line.action) && line.sectors[1] == Some(sector)
-            };
-            BOSS_TAGS.contains(&tag) || file.lines.iter().any(moves)
-        };
+        let acts = |line: &&Linedef| line.tag != 0 && !is_still(line.action);
+        let tags = file.lines.iter().filter(acts).map(|line| line.tag);
+        let tags: HashSet<u16> = tags.chain(BOSS_TAGS).collect();
+        let doors = file.lines.iter().filter(|line| is_door(line.action));
+        let doors: HashSet<u32> = doors.filter_map(|line| line.sectors[1]).collect();
+        let is_moved = |tag: &u16, sector: &u32| tags.contains(tag) || doors.contains(sector);
         let sectors = file.sectors.iter().zip(0..);
-        let sectors = sectors.map(|(sector, id)| match is_moved(sector.tag, id) {
+        let sectors = sectors.map(|(sector, id)| match is_moved(&sector.tag, &id) {
             true => [-HIGHEST, HIGHEST],
             false => sector.heights,
         });
         let has_length = |line: &&Linedef| line.ends[0] != line.ends[1];
+        let lines: Vec<Linedef> = file.lines.iter().filter(has_length).copied().collect();
+        let mut edges = vec![Vec::new(); file.sectors.len()];
+        for line in lines
+            .iter()
+            .filter(|line| line.sectors[0] != line.sectors[1])
+        {
+            let ([front, behind], [from, to]) = (line.sectors, line.ends);
+            for (sector, edge) in [(front, [from, to]), (behind, [to, from])] {
+                if let Some(sector) = sector {
+                    edges[sector as usize].push(edge);
+                }
+            }
+        }
         DoomMap {
-            lines: file.lines.iter().filter(has_length).copied().collect(),
+            lines,
+            edges,
             sectors: sectors.collect(),
             file: file.clone(),
         }

@@ -54,6 +54,9 @@ impl DoomMap {
             heights.sort_unstable_by(f64::total_cmp);
             heights.dedup();
             for height in heights {
+                if found.len() >= MOST_BOXES {
+                    break;
+                }
                 let at = |cell: usize| plan.cells[cell].map(|open| open[side] * up);
                 let solid = |cell: usize| at(cell).is_none_or(|own| own >= height * up);
                 let solid: Vec<bool> = (0..plan.cells.len()).map(solid).collect();
@@ -308,6 +311,7 @@ mod tests {
         let mut map = nested(&[([0, 0, 64, 64], Some([0.0, 64.0]))]);
         assert!(!map.solid_boxes([-64.0, 64.0]).is_empty());
         map.lines.pop();
+        let map = map_of(map.lines, map.sectors);
         assert!(map.solid_boxes([-64.0, 64.0]).is_empty());
     }
 

@@ -118,20 +118,9 @@ impl DoomMap {
         self.sectors[sector] != self.file.sectors[sector].heights
     }
 
-    /// The linedefs about a sector, which lies on the right of each.
-    ///
-    /// They are split at all of their ends.
+    /// The linedefs about a sector, split at all of their ends.
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
-        let mut edges = Vec::new();
-        for Linedef { ends, sectors, .. } in &self.lines {
-            let [front, behind] = sectors.map(|side| side == Some(sector));
-            let [from, to] = *ends;
-            match (front, behind) {
-                (true, false) => edges.push([from, to]),
-                (false, true) => edges.push([to, from]),
-                _ => {}
-            }
-        }
+        let edges = &self.edges[sector as usize];
         let ends: Vec<Point> = edges.iter().map(|[from, _]| *from).collect();
         edges.iter().flat_map(|edge| parted(*edge, &ends)).collect()
     }
