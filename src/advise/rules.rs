@@ -38,7 +38,7 @@ pub(super) const RULES: &[Rule] = rows! {
     "occlusion", "occlusion culling",
         "share of the items left by the other stages that others hide",
         Statistic, |_| reads(Occlusion);
-    "cones", "normal cones", "share of the triangles of the items left whose cluster faces away",
+    "back-faces", "back-face tests", "share of the triangles of the items left that face away",
         Statistic, |_| reads(Triangle);
     "sorting", "depth sorting",
         "share of the shaded fragments that an early z-test saves once items are sorted",
@@ -200,9 +200,7 @@ const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'s> {
     let most = (ITEMS / setting.scene.items.len().max(1)).clamp(1, VIEWS);
     let structures = slice::from_ref(tree);
-    let chain = Chain::for_scene(&setting.scene, structures, false)
-        .with(StageKind::Triangle, "several-cones")
-        .with(StageKind::Fragment, NONE);
+    let chain = Chain::for_scene(&setting.scene, structures, false).with(StageKind::Fragment, NONE);
     FunnelInput {
         structures,
         all: false,

@@ -43,8 +43,8 @@ fn regions_are_kept_where_they_remove_what_occlusion_leaves() {
 }
 
 #[test]
-fn cones_are_kept_where_triangles_cost_something() {
-    let of = |more: &str| decided("cones", &format!("--scene city:n=2000 {more}"));
+fn back_faces_are_tested_where_triangles_cost_something() {
+    let of = |more: &str| decided("back-faces", &format!("--scene city:n=2000 {more}"));
     let (kept, away) = of("--path street:frames=12 --draw-ns 1e5");
     assert_eq!(kept, "keep");
     // Of a box one sees one to three of six faces.
@@ -57,7 +57,7 @@ fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
     let of = |more: &str| {
         let line = format!("advise --structure linear,wide --path street:frames=8 {more}");
         let advice = advice(Path::new("."), &line);
-        ["occlusion", "cones", "sorting"].map(|name| {
+        ["occlusion", "back-faces", "sorting"].map(|name| {
             let rule = rule(&advice, name);
             (rule["decision"].clone(), number(rule, "statistic"))
         })

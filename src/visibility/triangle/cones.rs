@@ -1,6 +1,4 @@
-//! Cones per cluster in f32 with a proven margin, sixteen clusters at a time.
-//!
-//! With several cones per cluster each is that of triangles turned alike.
+//! A cone per cluster in f32 with a proven margin, sixteen clusters at a time.
 //!
 //! Let all normals be within the angle alpha of the axis A, and the apex P not in
 //! front of any triangle. For an eye e with v = P - e and v.A >= sin(alpha) |A| |v|,
@@ -127,109 +125,45 @@ fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
     None
 }
 
-/// Rounds of moving triangles to the nearest of the directions.
-const ROUNDS: usize = 8;
-
-/// `N` cones per cluster.
+/// A cone per cluster.
 #[derive(Clone, Debug)]
-pub struct Cones<const N: usize> {
-    /// The `n`-th cones of sixteen clusters side by side.
-    cones: Vec<[ConeBlock; N]>,
-    /// The triangles of each cone; empty with one cone per cluster, which has all.
-    triangles: Vec<[[u64; LANES]; N]>,
-}
+pub struct Cones(Vec<ConeBlock>);
 
-impl<const N: usize> Cones<N> {
+impl Cones {
     /// Fits the cones. O(t).
-    pub fn of(clusters: &Arc<Clusters>) -> Cones<N> {
-        let blocks = clusters.len().div_ceil(LANES);
-        let mut cones = vec![[ConeBlock::EMPTY; N]; blocks];
-        let mut words = vec![[[0; LANES]; N]; if N > 1 { blocks } else { 0 }];
+    pub fn of(clusters: &Arc<Clusters>) -> Cones {
+        let mut cones = vec![ConeBlock::EMPTY; clusters.len().div_ceil(LANES)];
         for (cluster, triangles) in clusters.one_sided() {
-            let (block, lane) = (cluster / LANES, cluster % LANES);
-            let groups = match N {
-                1 => [u64::MAX; N],
-                _ => groups(&triangles),
-            };
-            for (n, word) in groups.into_iter().enumerate() {
-                let bits = (0..triangles.len()).filter(|bit| word >> bit & 1 == 1);
-                let own: Vec<[Vec3; 3]> = bits.map(|bit| triangles[bit]).collect();
-                if let Some(cone) = Cone::fit(&own) {
-                    cones[block][n].set(lane, &cone);
-                    if let Some(words) = words.get_mut(block) {
-                        words[n][lane] = word;
-                    }
-                }
+            if let Some(cone) = Cone::fit(&triangles) {
+                cones[cluster / LANES].set(cluster % LANES, &cone);
             }
         }
-        Cones {
-            cones,
-            triangles: words,
-        }
+        Cones(cones)
     }
 }
 
-impl<const N: usize> TriangleCull for Cones<N> {
+impl TriangleCull for Cones {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
         // From farther away the test could overflow.
         if eye.nearest.abs().max_element() < FAR {
-            kernel.run(Query(self, eye, &mut kept.blocks));
+            kernel.run(Query(&self.0, eye, &mut kept.blocks));
         }
     }
 }
 
-struct Query<'a, const N: usize>(&'a Cones<N>, &'a Eye, &'a mut [[u64; LANES]]);
+struct Query<'a>(&'a [ConeBlock], &'a Eye, &'a mut [[u64; LANES]]);
 
-impl<const N: usize> Work for Query<'_, N> {
+impl Work for Query<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Query(all, eye, words) = self;
+        let Query(cones, eye, words) = self;
         let view = Broadcast::of(isa, eye);
-        for (i, words) in words.iter_mut().enumerate() {
-            for (n, block) in all.cones[i].iter().enumerate() {
-                let gone = rejected(isa, block, &view);
-                match N {
-                    1 => clear(words, gone, &[u64::MAX; LANES]),
-                    _ => clear(words, gone, &all.triangles[i][n]),
-                }
-            }
+        for (block, words) in cones.iter().zip(words) {
+            clear(words, rejected(isa, block, &view));
         }
     }
-}
-
-/// The triangles in groups of like normals, a bit per triangle.
-///
-/// The farthest directions first, then each to the nearest mean (Lloyd 1982).
-fn groups<const N: usize>(triangles: &[[Vec3; 3]]) -> [u64; N] {
-    let unit = |corners: &[Vec3; 3]| normal(*corners).normalize_or_zero();
-    let normals: Vec<DVec3> = triangles.iter().map(unit).collect();
-    let mut means = [normals.iter().sum::<DVec3>().normalize_or_zero(); N];
-    for k in 0..N {
-        let known = &means[..k.max(1)];
-        let nearest = |n: &DVec3| known.iter().map(|m| m.dot(*n)).fold(-2.0, f64::max);
-        let by_nearest = |a: &DVec3, b: &DVec3| nearest(a).total_cmp(&nearest(b));
-        let farthest = normals.iter().copied().min_by(by_nearest);
-        means[k] = farthest.unwrap_or(DVec3::Z);
-    }
-    let mut words = [0u64; N];
-    for _ in 0..ROUNDS {
-        words = [0; N];
-        let mut sums = [DVec3::ZERO; N];
-        for (bit, n) in normals.iter().enumerate() {
-            let best = (1..N).fold(0, |best, k| {
-                let is_nearer = means[k].dot(*n) > means[best].dot(*n);
-                if is_nearer { k } else { best }
-            });
-            words[best] |= 1 << bit;
-            sums[best] += *n;
-        }
-        for (mean, sum) in means.iter_mut().zip(sums) {
-            *mean = sum.try_normalize().unwrap_or(*mean);
-        }
-    }
-    words
 }
 
 /// Sixteen cones in f32: 28 bytes a cone.
@@ -329,18 +263,18 @@ const SPREAD: [[u64; 4]; 16] = {
     spread
 };
 
-/// Takes `triangles` out of the words of the lanes that are gone, without branches.
+/// Clears the words of the lanes that are gone, without branches.
 ///
 /// Four lanes at a time, by a table: compilers turn a comparison here into masked stores.
 #[inline(always)]
-fn clear(words: &mut [u64; LANES], gone: LaneMask, triangles: &[u64; LANES]) {
+fn clear(words: &mut [u64; LANES], gone: LaneMask) {
     if gone == 0 {
         return;
     }
     for part in 0..LANES / 4 {
         let spread = &SPREAD[usize::from(gone >> (4 * part)) & 15];
         for lane in 0..4 {
-            words[4 * part + lane] &= !(spread[lane] & triangles[4 * part + lane]);
+            words[4 * part + lane] &= !spread[lane];
         }
     }
 }

@@ -23,10 +23,7 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = rows! { TriangleRow { name, guarantee,
         |clusters| Box::new(per_triangle::PerTriangle::of(clusters));
     "cone-f32-safe", Guarantee::Conservative,
         "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
-        |clusters| Box::new(Cones::<1>::of(clusters));
-    "several-cones", Guarantee::Conservative,
-        "Four cones per cluster, each of triangles of similar orientation, rounding proven",
-        |clusters| Box::new(Cones::<4>::of(clusters));
+        |clusters| Box::new(Cones::of(clusters));
 };
 
 #[cfg(test)]

@@ -195,6 +195,5 @@ fn the_proven_margin_costs_next_to_nothing() {
         };
         let unsafe_one = removed("cone-f32");
         assert!(removed("cone-f32-safe") >= 0.99 * unsafe_one, "{name}");
-        assert!(removed("several-cones") >= 1.1 * unsafe_one, "{name}");
     }
 }
