@@ -112,7 +112,7 @@ def answers():
     for arguments in FUNNELS:
         text = output("funnel", *arguments, "--frames", "32", "--samples", "64x36", "--processes", "1", "--format", "json")
         found = json.loads(text)
-        for section, names in (("stages", ("stage", "name", "structure")), ("orders", ("name",)),
+        for section, names in (("stages", ("stage", "name", "structure")),
                                ("picks", ("question", "name")), ("gains", ("stage", "back_end"))):
             for name, rows in rows_by(found.pop(section), *names).items():
                 yield f"funnel {' '.join(arguments)} {section} {name}", rows

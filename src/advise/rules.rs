@@ -14,7 +14,7 @@ use super::rule::{Draft, Finding, Rule};
 use super::trials::By::{Error, Rule as Statistic, Time};
 use super::trials::{BASE, Check, Sides, Trials};
 use crate::drift::walk;
-use crate::funnel::StageKind::{self, Fragment, Occlusion, Region, Triangle};
+use crate::funnel::StageKind::{self, Occlusion, Region, Triangle};
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE};
 use crate::index::StructureSpec;
 use crate::measure::Setting;
@@ -40,9 +40,6 @@ pub(super) const RULES: &[Rule] = rows! {
         Statistic, |_| reads(Occlusion);
     "back-faces", "back-face tests", "share of the triangles of the items left that face away",
         Statistic, |_| reads(Triangle);
-    "sorting", "depth sorting",
-        "share of the shaded fragments that an early z-test saves once items are sorted",
-        Statistic, |_| reads(Fragment);
     "third-dimension", "third dimension", "height of the scene", Time, third_dimension;
     "rebasing", "rebasing", "margin for rounding in world coordinates / depth of the view",
         Error, planes::rebasing;
@@ -192,9 +189,8 @@ fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
 /// Most views, and most items of all of them.
 const VIEWS: usize = 8;
 const ITEMS: usize = 100_000;
-/// Samples of a view and of the occlusion buffer; of the image that is shaded.
+/// Samples of a view and of the occlusion buffer.
 const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
-const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
 /// The stages on a tree.
 pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'s> {
@@ -205,13 +201,9 @@ pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'
         structures,
         all: false,
         picks: false,
-        sorted: true,
         ..FunnelInput::new(setting, chain, (most, SAMPLES), tree.execution)
     }
 }
-
-/// Cost of shading a fragment, ns: an image of 1920 x 1080 in 2 ms.
-const SHADE_NS: f64 = 1.0;
 
 /// A rule about a stage; where the funnel has none it does not apply, for a reason.
 fn reads(stage: StageKind) -> anyhow::Result<Draft> {
@@ -222,35 +214,28 @@ fn reads(stage: StageKind) -> anyhow::Result<Draft> {
     }))
 }
 
-/// The gain of a stage, weighed; of the fragment stage, that of sorting.
+/// The gain of a stage, weighed.
 fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Finding, String> {
     let gain = |stage| funnel.gains.iter().find(|gain| gain.stage == stage);
     let mut left_out = funnel.left_out.iter();
-    let is_own = |section, name| match stage {
-        StageKind::Fragment => section == "orders",
-        _ => name == stage.name(),
-    };
     let own = gain(stage).ok_or_else(|| {
-        let row = left_out.find(|row| is_own(row.section, &row.name));
+        let row = left_out.find(|row| row.name == stage.name());
         let none = "the scene has no rooms or sectors that portals join";
         row.map_or(none, |row| &row.reason).to_owned()
     })?;
     let items = gain(StageKind::Occlusion).map_or(f64::NAN, |gain| gain.with_count);
     let of_item = own.without_count / items;
-    let large = SHADED.samples() as f64 / SAMPLES.samples() as f64;
     Ok(match stage {
-        StageKind::Triangle => weigh(own, "triangle", 1.0, draw_ns / of_item),
-        StageKind::Fragment => weigh(own, "fragment", large, SHADE_NS),
-        _ => weigh(own, "item", 1.0, draw_ns),
+        StageKind::Triangle => weigh(own, "triangle", draw_ns / of_item),
+        _ => weigh(own, "item", draw_ns),
     })
 }
 
 /// Leaves out where removing takes longer than drawing the removed candidates.
 ///
-/// A counted candidate, `one`, stands for `scale` of them; one that is not removed costs
-/// `cost_ns`.
-fn weigh(gain: &Gain, one: &str, scale: f64, cost_ns: f64) -> Finding {
-    let [with, without] = [gain.with_count, gain.without_count].map(|n| n * scale);
+/// A candidate, `one`, that is not removed costs `cost_ns`.
+fn weigh(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
+    let (with, without) = (gain.with_count, gain.without_count);
     if without == 0.0 {
         return Finding::none(format!("no {one} is in any view that was looked at"));
     }
@@ -288,7 +273,7 @@ mod tests {
         let named = ("rays", "items");
         let mut gain = Gain::new(StageKind::Occlusion, named, counts, Default::default());
         (gain.without_ns, gain.ratio) = (Some(100.0), Some(Estimate::exact(ratio)));
-        some_rule(By::Rule).omission(weigh(&gain, "thing", 1.0, cost_ns), None)
+        some_rule(By::Rule).omission(weigh(&gain, "thing", cost_ns), None)
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use super::document::{Block, Column, Table};
 use super::text::{self, shortened, some};
-use crate::funnel::{FunnelReport, Gain, NONE, OrderRow, PickRow, StageKind, StageRow};
+use crate::funnel::{FunnelReport, Gain, NONE, PickRow, StageKind, StageRow};
 use crate::visibility::Guarantee;
 use crate::visibility::fragment::Tally;
 
@@ -58,7 +58,6 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
             "Samples and fragments of the remaining items",
             fragments(report),
         ),
-        ("Draw orders of the remaining items", orders(report)),
         ("Picking: items under a cursor", picks(report)),
         ("With and without each stage of the chain", gains(report)),
     ] {
@@ -85,7 +84,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     };
     let told = report.conclusions.iter().filter(is_shown).cloned();
     blocks.extend(told.map(Block::Line));
-    let more = "every other back end, draw orders, picking: --all";
+    let more = "every other back end, picking: --all";
     blocks.extend(Block::more(all, more));
     blocks
 }
@@ -203,17 +202,6 @@ fn fragments(report: &FunnelReport) -> Table {
     let tests = tests.filter_map(|row| Some((row.back_end.name, row.fragments?)));
     let tests: Vec<_> = tests.collect();
     Table::with(if tests.len() < 2 { vec![] } else { tests }, columns)
-}
-
-fn orders(report: &FunnelReport) -> Table {
-    let columns: &[Column<&OrderRow>] = &[
-        ("order", |row| row.order.name().to_owned()),
-        (">fragments", |row| count(row.fragment_count)),
-        (">shaded", |row| count(row.shaded_count)),
-        (">overdraw", |row| some(row.overdraw, text::significant)),
-        (">time", |row| text::time_plus_minus(row.time)),
-    ];
-    Table::with(&report.orders, columns)
 }
 
 fn picks(report: &FunnelReport) -> Table {

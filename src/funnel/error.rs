@@ -16,7 +16,7 @@ pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), InputError> {
 /// A row that is left out of a section of the report.
 #[derive(Clone, Debug, Serialize)]
 pub struct LeftOutRow {
-    /// The section: `stages`, `orders` or `picks`.
+    /// The section: `stages` or `picks`.
     pub section: &'static str,
     /// A back end, a structure, a stage without any, or `all` of the section.
     pub name: String,

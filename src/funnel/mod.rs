@@ -10,7 +10,6 @@
 mod error;
 mod fragment_stage;
 mod item_stages;
-mod orders;
 mod picks;
 mod report;
 mod stage;
@@ -22,7 +21,6 @@ mod world;
 
 pub(crate) use error::check_memory;
 pub use item_stages::Fate;
-pub use orders::OrderRow;
 pub use picks::PickRow;
 pub use report::{FunnelReport, Gain, StageRow};
 pub use stage::{Chain, NEEDS, NONE, StageKind, back_ends, left_out_of};

@@ -5,7 +5,6 @@ use serde::Serialize;
 use super::error::LeftOutRow;
 use super::fragment_stage::FragmentCounts;
 use super::item_stages::PlanView;
-use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, default_test};
 use super::task::FunnelKey;
@@ -50,8 +49,6 @@ pub struct FunnelReport {
     pub solid_blocks: Option<BlocksRow>,
     /// Occluding boxes below the ground of a mesh; null for a scene without ground.
     pub ground: Option<GroundRow>,
-    /// Every draw order of the remaining items.
-    pub orders: Vec<OrderRow>,
     /// Items under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,
     /// Missing rows, each with its reason.

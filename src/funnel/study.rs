@@ -7,11 +7,10 @@ use anyhow::Result;
 use super::error::{LeftOutRow, check_memory};
 use super::fragment_stage::{FragmentCounts, FragmentStage};
 use super::item_stages::{ItemStages, PlanView};
-use super::orders::{OrderRow, Orders};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
 use super::stage::{Chain, NONE, StageKind, default_test, left_out_of};
-use super::task::{FunnelKey, FunnelPlan, KeyedTask};
+use super::task::{FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::truth::{Errors, Truth, visible};
 use super::world::{FunnelInput, World};
@@ -44,7 +43,6 @@ struct Study<'w> {
     items: ItemStages<'w>,
     triangles: TriangleStage,
     fragments: FragmentStage<'w>,
-    orders: Option<Orders<'w>>,
     picks: Option<Picks<'w>>,
 }
 
@@ -59,10 +57,7 @@ impl<'w> Study<'w> {
         let triangles = TriangleStage::new(&items);
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(&items, culled);
-        let is_ordered = input.all || input.sorted;
-        let is_ordered = is_ordered && fragments.too_much.is_none();
         Ok(Study {
-            orders: is_ordered.then(|| Orders::new(&items)),
             picks: (input.all && input.picks).then(|| Picks::new(world)),
             chain,
             items,
@@ -76,7 +71,6 @@ impl<'w> Study<'w> {
         let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
         tasks.extend(self.triangles.tasks());
         tasks.extend(self.fragments.tasks());
-        tasks.extend(self.orders.iter().flat_map(Orders::tasks));
         tasks.extend(self.picks.iter().flat_map(Picks::tasks));
         tasks
     }
@@ -134,18 +128,6 @@ impl<'w> Study<'w> {
         of_items.chain(behind).collect()
     }
 
-    /// The remaining items drawn from front to back, and as listed.
-    fn gain_of_sorting(&self, orders: &[OrderRow]) -> Option<Gain> {
-        let [listed, sorted] = orders else {
-            return None;
-        };
-        let timed = self.items.timed(self.chain);
-        let with = [&timed[..], &[FunnelKey::Order(sorted.order)]].concat();
-        let counts = [sorted.shaded_count, listed.shaded_count];
-        let named = (sorted.order.name(), "fragments");
-        Some(Gain::new(StageKind::Fragment, named, counts, [with, timed]))
-    }
-
     /// Unit and counts with and without a stage behind those of whole items. Without a
     /// test every fragment of the remaining items is shaded.
     fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
@@ -192,13 +174,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     let mut left_out = Vec::from_iter(left_out_of(scene));
     if let Some(reason) = &study.fragments.too_much {
         left_out.push(LeftOutRow::new("stages", "fragment", reason));
-        let orders = (input.all || input.sorted).then_some("orders");
-        left_out.extend(orders.map(|orders| LeftOutRow::new(orders, "all", reason)));
-    }
-    let mut orders = Vec::new();
-    if let Some(all) = &study.orders {
-        begin("every order, drawn");
-        orders = all.drawn();
     }
     let mut picks = Vec::new();
     if let Some(all) = &study.picks {
@@ -209,8 +184,6 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         let reason = "not asked for: --no-picks";
         left_out.push(LeftOutRow::new("picks", "all", reason));
     }
-    let mut gains = study.gains(&rows);
-    gains.extend(study.gain_of_sorting(&orders).filter(|_| input.sorted));
     let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
     let ground = world.hiders.ground.as_ref();
     let report = FunnelReport {
@@ -228,12 +201,11 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
             item_count: made.of_item.iter().flatten().count(),
         }),
         chain: input.chain.clone(),
-        gains,
+        gains: study.gains(&rows),
         stages: rows,
         inner_boxes: world.hiders.inner.clone(),
         ground: ground.map(|ground| ground.row.clone()),
         solid_blocks: world.hiders.blocks.clone(),
-        orders,
         picks,
         left_out,
         conclusions: Vec::new(),
@@ -272,9 +244,6 @@ impl Prepared {
         }
         for row in &mut report.picks {
             row.set(times.ns(row.key()));
-        }
-        for row in &mut report.orders {
-            row.time = times.ns(FunnelKey::Order(row.order));
         }
         report.gains.iter_mut().for_each(|gain| gain.set(&times));
         report.conclusions = conclusions(&report);

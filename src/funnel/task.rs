@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use super::stage::{StageKind, Step};
 use super::world::FunnelInput;
 use crate::measure::{Ask, ProcessTimes, StudyPlan, TimedTask};
-use crate::visibility::fragment::DrawOrder;
 
 named! {
     /// A question about a cursor.
@@ -34,8 +33,6 @@ pub enum FunnelKey {
     Steps(Vec<Step>),
     /// A back end of the triangle or fragment stage, behind the chain's item stages.
     Stage(StageKind, String),
-    /// A draw order.
-    Order(DrawOrder),
     /// A back end of picking.
     Pick(PickQuestion, String),
 }

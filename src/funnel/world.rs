@@ -57,12 +57,10 @@ pub struct FunnelInput<'a> {
     pub loading: LoadOptions,
     /// Instruction set of every stage, and threads that compute the truth.
     pub execution: Execution,
-    /// Every back end of every stage and draw orders beside the chain.
+    /// Every back end of every stage beside the chain.
     pub all: bool,
     /// Picking, if `all`.
     pub picks: bool,
-    /// Sorting the remaining items from front to back, without `all`.
-    pub sorted: bool,
 }
 
 impl<'a> FunnelInput<'a> {
@@ -85,7 +83,6 @@ impl<'a> FunnelInput<'a> {
             execution,
             all: true,
             picks: true,
-            sorted: false,
         }
     }
 }

@@ -15,7 +15,7 @@ use super::process::*;
 const SMALL: &str =
     "advise --scene uniform:n=900 --path orbit:frames=6 --structure linear,wide,bvh --processes";
 const RULES: &str = "needless-planes plane-masks no-index six-planes regions occlusion \
-     back-faces sorting third-dimension rebasing rebuild f64-kernel frame-correction";
+     back-faces third-dimension rebasing rebuild f64-kernel frame-correction";
 
 /// Advice from one process, for checks of everything but times.
 pub fn advice(folder: &Path, line: &str) -> Value {
@@ -168,7 +168,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
         assert!(number(&check["kept"], "ns") > 0.0 && number(&check["left_out"], "ns") > 0.0);
         assert_ratio(check);
         // What is hidden is in the frustum all the same: another truth.
-        if !set("occlusion back-faces sorting frame-correction").contains(name) {
+        if !set("occlusion back-faces frame-correction").contains(name) {
             for side in ["kept", "left_out"] {
                 let missed = number(&check[side], "false_negative_ppm");
                 assert_eq!(missed, 0.0, "{omission}");

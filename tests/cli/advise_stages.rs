@@ -57,7 +57,7 @@ fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
     let of = |more: &str| {
         let line = format!("advise --structure linear,wide --path street:frames=8 {more}");
         let advice = advice(Path::new("."), &line);
-        ["occlusion", "back-faces", "sorting"].map(|name| {
+        ["occlusion", "back-faces"].map(|name| {
             let rule = rule(&advice, name);
             (rule["decision"].clone(), number(rule, "statistic"))
         })
@@ -65,7 +65,6 @@ fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
     // Free drawing is worth no stage, dear drawing is worth one that removes much.
     let dear = of("--scene freedm-map20 --draw-ns 1e7");
     let free = of("--scene freedm-map20 --draw-ns 0");
-    // What shading costs is not the cost of drawing.
     for (i, least) in [0.2, 0.2].into_iter().enumerate() {
         assert!(dear[i].0 == "keep" && dear[i].1 > least, "{i} {dear:?}");
         assert!(

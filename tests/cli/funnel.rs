@@ -177,7 +177,6 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         "ground",
         "solid_blocks",
         "stages",
-        "orders",
         "picks",
         "gains",
     ];
@@ -302,12 +301,7 @@ fn the_chain_is_shown_and_the_rest_is_asked_for() {
         chain.contains("200 items; 8 of 32 views of 32 x 18 samples"),
         "{chain}"
     );
-    let rest = [
-        "masked?",
-        "?: FN at these samples only",
-        "Draw orders",
-        "Picking",
-    ];
+    let rest = ["masked?", "?: FN at these samples only", "Picking"];
     for name in rest {
         assert!(!chain.contains(&format!("{name} ")) && !chain.contains(&format!("{name}:")));
     }
@@ -332,29 +326,6 @@ pub fn picked_exactly(report: &Value) {
         for row in sound {
             assert_eq!(number(row, "wrong_count"), 0.0, "{row}");
         }
-    }
-}
-
-/// Checks the draw orders of items made of triangles.
-///
-/// The scene has the orders by boxes. Both draw the same fragments; sorted ones are
-/// shaded no more often than in the order of ids.
-pub fn orders_of_triangles(report: &Value) {
-    let orders = array(report, "orders");
-    let names: Vec<_> = orders
-        .iter()
-        .filter_map(|order| order["name"].as_str())
-        .collect();
-    assert_eq!(names, ["none", "box-distance"]);
-    let none = &orders[0];
-    for order in orders {
-        for count in ["fragment_count", "covered_count"] {
-            assert_eq!(order[count], none[count], "{count}");
-        }
-        let shaded = number(order, "shaded_count");
-        assert!(shaded >= number(order, "covered_count"));
-        assert!(shaded <= number(none, "shaded_count"));
-        assert!(number(order, "stage_ns") > 0.0);
     }
 }
 

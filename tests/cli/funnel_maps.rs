@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::funnel::{counted, orders_of_triangles, picked_exactly, row, rows};
+use super::funnel::{counted, picked_exactly, row, rows};
 use super::process::*;
 
 /// The depth test removes items behind walls, floors and ceilings.
@@ -61,7 +61,6 @@ fn a_map_has_regions_and_the_faces_of_its_walls() {
         let row = row(&outside, "occlusion", name);
         assert_eq!(number(row, "output_count"), number(row, "input_count"));
     }
-    orders_of_triangles(&report);
     picked_exactly(&report);
 }
 

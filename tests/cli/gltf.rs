@@ -276,35 +276,6 @@ fn a_material_is_that_of_its_primitive_at_every_stage() {
     }
 }
 
-/// Panes one behind the other hide nothing, so no order of them saves a fragment.
-#[test]
-fn an_order_of_glass_saves_nothing() {
-    let camera = format!("{FULL_CAMERA}\n0,0.1,0.2,10,0.1,0.2,0,1,0,60,1.5,0.1,100\n");
-    for (material, shaded) in [(0, 48.0 * 32.0 * 2.0), (1, 0.0)] {
-        let [near, far] = [4.0, 5.0].map(|x| [(pane(x, [[-9.0, -9.0], [9.0, 9.0]]), material)]);
-        let (file, bytes) = of_primitives(&[&far, &near]);
-        let files: [(&str, &[u8]); 3] = [
-            ("m.gltf", file.as_bytes()),
-            ("b.bin", &bytes),
-            ("c.csv", camera.as_bytes()),
-        ];
-        let folder = folder(&files);
-        let line = "funnel --scene m.gltf --path c.csv --samples 48x32 --processes 1 --no-picks \
-                    --format json";
-        let report = json(&works(folder.path(), line));
-        let [listed, sorted] = ["none", "box-distance"].map(|name| {
-            let rows = array(&report, "orders");
-            let row = rows.iter().find(|row| row["name"] == name);
-            number(row.expect("an order"), "shaded_count")
-        });
-        assert_eq!(
-            [listed, sorted],
-            [shaded, shaded / 2.0],
-            "material {material}"
-        );
-    }
-}
-
 #[test]
 fn its_cameras_keep_their_lens_and_its_animation_is_a_path() {
     let folder = folder(&[]);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::funnel::{orders_of_triangles, picked_exactly, row, rows};
+use super::funnel::{picked_exactly, row, rows};
 use super::process::*;
 
 #[test]
@@ -41,7 +41,6 @@ fn the_funnel_of_a_mesh_is_judged_by_its_triangles() {
         let exact = row(&report, "triangle", "per-triangle");
         assert_eq!(number(exact, "false_positive_count"), 0.0, "{scene}");
         assert_eq!(number(none, "input_count"), number(exact, "input_count"));
-        orders_of_triangles(&report);
         picked_exactly(&report);
         match scene.split(':').nth(1) {
             // Geodesic spheres of 1,280 triangles.

@@ -10,12 +10,10 @@
 mod canvas;
 mod cut_outs;
 mod draw;
-mod order;
 
 pub use canvas::{Canvas, Rectangle, Screen, Stencil};
 pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface};
 pub use draw::{Drawable, Drawn, Tally, Tests};
-pub use order::{DrawOrder, ORDERS, draw_orders};
 
 #[cfg(test)]
 mod tests;
