@@ -298,7 +298,9 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
 fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
     let is_shallow = |camera: &&Camera| {
-        let Some(matrix) = camera.lens.matrix().filter(|m| !m.is_from_zero()) else {
+        // An oblique near plane has depth -1, and often no far plane.
+        let is_read = |m: &&ViewProjection| !m.is_from_zero() && unstraight(camera).is_none();
+        let Some(matrix) = camera.lens.matrix().filter(is_read) else {
             return false;
         };
         let [_, _, z, w] = matrix.rows();

@@ -399,19 +399,27 @@ fn angles_in_radians_are_doubted() {
 fn reversed_depth_from_0_to_1_is_doubted_where_it_is_read_from_minus_1() {
     let scene = scene("uniform:n=50");
     let (near, far) = (0.1, 60.0);
-    let told = |convention| {
-        let rows = [
-            [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, near / (far - near), near * far / (far - near)],
-            [0.0, 0.0, -1.0, 0.0],
-        ];
+    let rows = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, near / (far - near), near * far / (far - near)],
+        [0.0, 0.0, -1.0, 0.0],
+    ];
+    // Depth -1 is a water plane.
+    let oblique = [
+        [1.155, 0.0, 0.0, 0.0],
+        [0.0, -0.4977, 1.659, -9.954],
+        [0.0, -0.9578, 2.136, -29.6],
+        [0.0, 0.9578, 0.2873, 29.6],
+    ];
+    let told = |convention, rows| {
         let camera = Camera::of_matrix(rows, convention).unwrap();
         let told = warnings(&scene, "p", &[camera]).join(", ");
         told.contains("depth -1 is never reached")
     };
     let conventions = [MatrixConvention::ColumnGl, MatrixConvention::ColumnD3d];
-    assert_eq!(conventions.map(told), [true, false]);
+    assert_eq!(conventions.map(|name| told(name, rows)), [true, false]);
+    assert!(!told(conventions[0], oblique));
 }
 
 /// Two cameras along y with z up, and one that is rolled, turned down or far off.
