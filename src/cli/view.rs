@@ -442,6 +442,29 @@ mod tests {
         }
     }
 
+    /// Past straight down, and upside down in OpenGL, in a left-handed world.
+    #[test]
+    fn a_mirrored_view_is_turned_over_only_where_y_may_point_down() {
+        let lens = Lens::perspective(60.0, 1.5, 0.5, Some(40.0)).unwrap();
+        let (over, mirror) = (DVec3::new(0.02, 0.0, 1.0), DVec3::new(-1.0, 1.0, 1.0));
+        for (eye, up, clip, convention) in [
+            (over, DVec3::X, ClipSpace::D3d, MatrixConvention::ColumnD3d),
+            (
+                DVec3::X,
+                -DVec3::Z,
+                ClipSpace::OpenGl,
+                MatrixConvention::ColumnGl,
+            ),
+        ] {
+            let frame = crate::camera::look_at(eye, DVec3::ZERO, up).unwrap();
+            let matrix = DMat4::from_scale(mirror) * lens.projection(clip) * frame.world_to_eye();
+            let entries = matrix.transpose().to_cols_array_2d();
+            let camera = [Camera::of_matrix(entries, convention).unwrap()];
+            let found = CameraFacts::of(&camera, UpAxis::Z).matrix.unwrap();
+            assert!(DVec3::from(found.up).dot(up) > 0.9, "{found:?}");
+        }
+    }
+
     #[test]
     fn numbers_and_runs_are_packed_as_the_page_reads_them() {
         let mut packed = Packed::default();

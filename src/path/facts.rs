@@ -128,13 +128,19 @@ impl MatrixFacts {
 /// Returns whether y points down in the images of matrices (Vulkan).
 ///
 /// The up axis of their scene decides: an image is mirrored in a left-handed world too.
+/// Cameras that look straight down are for neither, and OpenGL has y upward.
 pub fn is_downward(cameras: &[Camera], up: UpAxis) -> bool {
     let along = |camera: &Camera| {
-        let found = camera.lens.matrix()?.unprojected().ok()?;
+        let matrix = camera.lens.matrix().filter(|m| m.is_from_zero())?;
+        let found = matrix.unprojected().ok()?;
         found.is_mirrored.then(|| found.image[1].dot(up.vector()))
     };
-    cameras.iter().filter_map(along).sum::<f64>() < 0.0
+    let along: Vec<f64> = cameras.iter().filter_map(along).collect();
+    along.iter().sum::<f64>() < -SLANTED * along.len() as f64
 }
+
+/// Sine of the angle to straight up or down that decides which axis is up.
+const SLANTED: f64 = 0.1;
 
 /// Vertical angle of view in degrees, and width / height.
 fn shape(lens: &Lens) -> [Option<f64>; 2] {
@@ -258,7 +264,7 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let against = |axis: UpAxis, (u, v, is_mirrored): &(DVec3, DVec3, bool)| {
         let [across, along] = [u, v].map(|own| own.dot(axis.vector()));
         // Straight up or down there is no roll.
-        let is_known = across.hypot(along) > 0.1;
+        let is_known = across.hypot(along) > SLANTED;
         let along = if *is_mirrored { along.abs() } else { along };
         is_known.then_some((across.abs(), along))
     };
