@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::matrix::{about, unprojected};
-use super::{Camera, Lens, Pose, Result, ViewProjection, require};
+use super::{Camera, FARTHEST, Lens, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
 /// A view whose depth is a smaller share of its distance from the eye counts as
@@ -41,6 +41,13 @@ pub struct Unprojected {
     pub tilt: f64,
 }
 
+impl Unprojected {
+    /// Returns whether the image is sheared, or depth lies off the axis of view.
+    pub fn is_sheared(&self) -> bool {
+        self.shear > STRAIGHT || self.tilt > STRAIGHT
+    }
+}
+
 impl ViewProjection {
     /// The frame and the lens that this matrix was made of.
     ///
@@ -50,7 +57,10 @@ impl ViewProjection {
         let depths = self.depths();
         let along = |row: usize| DVec3::from_slice(&self.rows[row]);
         let [x, y, z, w] = [0, 1, 2, 3].map(along);
-        let axis = self.axis();
+        // Without an exact inverse where far is clearly farther from an eye than near.
+        let is_eye = !self.is_parallel && self.near < FARTHEST;
+        let is_clear = is_eye && self.far.is_none_or(|far| far > 2.0 * self.near);
+        let axis = if is_clear { None } else { self.axis() };
         let is_short = |[near, ahead]: [DVec3; 2]| {
             ahead.length() < PARALLEL * near.distance(self.eye) || self.is_parallel
         };
@@ -88,14 +98,6 @@ impl ViewProjection {
             shear: image[0].dot(image[1]).abs(),
             tilt: aside(z).length() / change.length(),
         })
-    }
-
-    /// Returns whether the image is sheared, or depth lies off the axis of view.
-    ///
-    /// `None` without a lens.
-    pub fn is_sheared(&self) -> Option<bool> {
-        let found = self.unprojected().ok()?;
-        Some(found.shear > STRAIGHT || found.tilt > STRAIGHT)
     }
 
     /// Returns whether it has no lens: axes of unit length, and w is 1 everywhere.

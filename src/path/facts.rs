@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibrate::{MOST_TESTS, every_nth};
 use super::{CameraPath, LensDefaults};
-use crate::camera::{Camera, FARTHEST, Lens, LensKind, PlaneOptions, ViewProjection};
+use crate::camera::{Camera, FARTHEST, Lens, LensKind, PlaneOptions, Unprojected, ViewProjection};
 use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::{counted, significant};
@@ -55,13 +55,26 @@ pub struct MatrixFacts {
     pub is_mirrored: bool,
 }
 
+/// A camera, and what its matrix was made of: `None` for other cameras and without a lens.
+type Taken<'a> = (&'a Camera, Option<Box<Unprojected>>);
+
+/// Matrices as frames and lenses, computed exactly: once for all facts and doubts.
+pub fn taken_apart(cameras: &[Camera]) -> Vec<Taken<'_>> {
+    let of = |camera: &Camera| camera.lens.matrix()?.unprojected().ok();
+    let all = cameras.iter();
+    all.map(|camera| (camera, of(camera).map(Box::new)))
+        .collect()
+}
+
 impl CameraFacts {
     /// Facts of the cameras of a path, in a scene with an up axis.
     pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
-        let one = |camera: &Camera| {
+        let taken = taken_apart(cameras);
+        let one = |(camera, found): &Taken| {
             // Of a matrix without a lens the matrix itself.
-            let found = camera.lens.matrix().and_then(|m| m.unprojected().ok());
-            let lens = found.map_or(camera.lens, |found| found.camera.lens);
+            let lens = found
+                .as_ref()
+                .map_or(camera.lens, |found| found.camera.lens);
             let height = lens.height_at(1.0).filter(|_| lens.is_orthographic());
             let [fovy_deg, aspect] = shape(&lens);
             let values = [fovy_deg, height, aspect, Some(lens.near())];
@@ -75,9 +88,9 @@ impl CameraFacts {
                 matrix: None,
             }
         };
-        let all = cameras.iter().map(one).reduce(CameraFacts::with);
+        let all = taken.iter().map(one).reduce(CameraFacts::with);
         CameraFacts {
-            matrix: MatrixFacts::of(cameras, up),
+            matrix: MatrixFacts::of(&taken, up),
             ..all.unwrap_or_default()
         }
     }
@@ -99,11 +112,11 @@ impl CameraFacts {
 }
 
 impl MatrixFacts {
-    fn of(cameras: &[Camera], up: UpAxis) -> Option<MatrixFacts> {
-        let matrix = cameras.first()?.lens.matrix()?;
-        let found = matrix.unprojected().ok()?;
+    fn of(taken: &[Taken], up: UpAxis) -> Option<MatrixFacts> {
+        let (camera, found) = taken.first()?;
+        let (matrix, found) = (camera.lens.matrix()?, found.as_ref()?);
         let (frame, [x, y]) = (found.camera.frame, found.image);
-        let y = if is_downward(cameras, up) { -y } else { y };
+        let y = if is_downward(taken, up) { -y } else { y };
         let along = |axis: DVec3, image: DVec3| axis * axis.dot(image).signum();
         let axes = [
             frame.eye,
@@ -129,13 +142,12 @@ impl MatrixFacts {
 ///
 /// The up axis of their scene decides: an image is mirrored in a left-handed world too.
 /// Cameras that look straight down are for neither, and OpenGL has y upward.
-pub fn is_downward(cameras: &[Camera], up: UpAxis) -> bool {
-    let along = |camera: &Camera| {
-        let matrix = camera.lens.matrix().filter(|m| m.is_from_zero())?;
-        let found = matrix.unprojected().ok()?;
-        found.is_mirrored.then(|| found.image[1].dot(up.vector()))
-    };
-    let along: Vec<f64> = cameras.iter().filter_map(along).collect();
+pub fn is_downward(taken: &[Taken], up: UpAxis) -> bool {
+    let found = taken.iter().filter_map(|(_, found)| found.as_ref());
+    let mirrored = found.filter(|found| found.is_mirrored && found.depths.contains(&0.0));
+    let along: Vec<f64> = mirrored
+        .map(|found| found.image[1].dot(up.vector()))
+        .collect();
     along.iter().sum::<f64>() < -SLANTED * along.len() as f64
 }
 
@@ -161,21 +173,26 @@ const FAR_OUTSIDE: f64 = 3.0;
 
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
-    type Doubt = fn(&Scene, &[Camera]) -> Option<String>;
-    const DOUBTS: [Doubt; 8] = [
-        bare,
-        narrow,
-        rolled,
-        sheared,
-        shallow,
-        upward_parallel,
-        far_outside,
-        blind,
-    ];
-    let found = || DOUBTS.iter().filter_map(|doubt| doubt(scene, cameras));
+    let taken = taken_apart(cameras);
+    let found = || {
+        [
+            bare(cameras),
+            narrow(cameras),
+            rolled(scene, &taken),
+            sheared(&taken),
+            shallow(&taken),
+            upward_parallel(scene, cameras),
+            far_outside(scene, cameras),
+            blind(scene, cameras),
+        ]
+    };
     // The axes and the eye of a matrix that is read wrongly are no camera's.
-    let found = transposed(cameras).map_or_else(|| found().collect(), |only| vec![only]);
-    let found = found.iter().map(|doubt| format!("{path}: {doubt}"));
+    let only = transposed(&taken);
+    let found = only.map_or_else(|| found().into(), |only| vec![Some(only)]);
+    let found = found
+        .iter()
+        .flatten()
+        .map(|doubt| format!("{path}: {doubt}"));
     found.collect()
 }
 
@@ -207,18 +224,18 @@ impl LensDefaults {
 }
 
 /// "2 of 8 cameras".
-fn share(part: usize, cameras: &[Camera]) -> String {
+fn share<T>(part: usize, cameras: &[T]) -> String {
     format!("{part} of {}", counted(cameras.len(), "camera"))
 }
 
 /// The share of the cameras that are of a kind, if any is.
-fn share_of(cameras: &[Camera], is_one: impl Fn(&&Camera) -> bool) -> Option<String> {
+fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
     let count = cameras.iter().filter(is_one).count();
     (count > 0).then(|| share(count, cameras))
 }
 
 /// View matrices without a projection, which see two units of width and height.
-fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
+fn bare(cameras: &[Camera]) -> Option<String> {
     let is_bare = |camera: &&Camera| camera.lens.matrix().is_some_and(ViewProjection::is_bare);
     let what = share_of(cameras, is_bare)?;
     Some(format!(
@@ -227,7 +244,7 @@ fn bare(_: &Scene, cameras: &[Camera]) -> Option<String> {
 }
 
 /// Perspectives all of which are so narrow that their angle may be in radians.
-fn narrow(_: &Scene, cameras: &[Camera]) -> Option<String> {
+fn narrow(cameras: &[Camera]) -> Option<String> {
     let is_narrow = |camera: &Camera| shape(&camera.lens)[0].is_some_and(|fovy| fovy < 2.0);
     let is_doubtful = !cameras.is_empty() && cameras.iter().all(is_narrow);
     let what = "a field of view under 2 degrees in all cameras; fovy is in degrees, not in radians";
@@ -251,16 +268,15 @@ fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 }
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
-fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let axes = |camera: &Camera| {
-        let found = camera.lens.matrix().map(ViewProjection::unprojected);
-        let found = found.transpose().ok()?;
-        let frame = found.map_or(camera.frame, |found| found.camera.frame);
+fn rolled(scene: &Scene, taken: &[Taken]) -> Option<String> {
+    let axes = |(camera, found): &Taken| {
+        let own = camera.lens.matrix().is_none().then_some(camera.frame);
+        let frame = found.as_ref().map(|found| found.camera.frame).or(own)?;
         // A mirrored image may have y downward.
-        let is_mirrored = found.is_some_and(|found| found.is_mirrored);
+        let is_mirrored = found.as_ref().is_some_and(|found| found.is_mirrored);
         Some((frame.u(), frame.v(), is_mirrored))
     };
-    let all: Vec<(DVec3, DVec3, bool)> = cameras.iter().filter_map(axes).collect();
+    let all: Vec<(DVec3, DVec3, bool)> = taken.iter().filter_map(axes).collect();
     let against = |axis: UpAxis, (u, v, is_mirrored): &(DVec3, DVec3, bool)| {
         let [across, along] = [u, v].map(|own| own.dot(axis.vector()));
         // Straight up or down there is no roll.
@@ -280,15 +296,15 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         match others.find(|axis| 2 * is_up(axis) > rolled().count()) {
             Some(other) => {
                 let count = count(other);
-                let (what, other, name) = (share(count, cameras), other.name(), &scene.name);
+                let (what, other, name) = (share(count, taken), other.name(), &scene.name);
                 // Formats that state an axis state a unit as well.
-                let is_advised = scene.unit.is_none() && 2 * count >= cameras.len();
+                let is_advised = scene.unit.is_none() && 2 * count >= taken.len();
                 let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
                 let advice = advice.unwrap_or_default();
                 format!("{other} is up in {what}, {own} in {name}{advice}")
             }
             None => {
-                let what = share(rolled().count(), cameras);
+                let what = share(rolled().count(), taken);
                 // -0 is 0.
                 let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
                 format!(
@@ -302,10 +318,11 @@ fn rolled(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 }
 
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
-fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
-    let is_shallow = |camera: &&Camera| {
+fn shallow(taken: &[Taken]) -> Option<String> {
+    let is_shallow = |taken: &&Taken| {
+        let camera = taken.0;
         // An oblique near plane has depth -1, and often no far plane.
-        let is_read = |m: &&ViewProjection| !m.is_from_zero() && unstraight(camera).is_none();
+        let is_read = |m: &&ViewProjection| !m.is_from_zero() && !is_sheared(taken);
         let Some(matrix) = camera.lens.matrix().filter(is_read) else {
             return false;
         };
@@ -313,26 +330,29 @@ fn shallow(_: &Scene, cameras: &[Camera]) -> Option<String> {
         let along = |row: &[f64; 4]| DVec3::from_slice(row).dot(camera.frame.forward());
         camera.lens.far().is_none() && (along(z) / along(w)).abs() < 0.5
     };
-    let what = share_of(cameras, is_shallow)?;
+    let what = share_of(taken, is_shallow)?;
     Some(format!(
         "{what} read without a far plane, as depth -1 is never reached; --matrix-convention \
          column-d3d or row-d3d if depth is from 0 to 1"
     ))
 }
 
-/// The matrix of a camera, if it has no right angles as it is read.
-fn unstraight(camera: &Camera) -> Option<&ViewProjection> {
-    let matrix = camera.lens.matrix();
-    matrix.filter(|matrix| matrix.is_sheared() == Some(true))
+/// Returns whether a matrix has no right angles as it is read.
+fn is_sheared((_, found): &&Taken) -> bool {
+    found.as_ref().is_some_and(|found| found.is_sheared())
 }
 
 /// Matrices that are no camera's, where all their transposes are.
-fn transposed(cameras: &[Camera]) -> Option<String> {
-    let convention = cameras.iter().find_map(unstraight)?.convention();
-    let is_straight = |matrix: ViewProjection| matrix.is_sheared() == Some(false);
-    let is_turned = |matrix: &ViewProjection| matrix.transposed().is_some_and(is_straight);
-    let are_all = cameras.iter().filter_map(unstraight).all(is_turned);
-    let what = share_of(cameras, |camera| are_all && unstraight(camera).is_some())?;
+fn transposed(taken: &[Taken]) -> Option<String> {
+    let sheared = taken.iter().filter(is_sheared);
+    let mut sheared = sheared.filter_map(|(camera, _)| camera.lens.matrix());
+    let convention = sheared.clone().next()?.convention();
+    let is_turned = |matrix: &ViewProjection| {
+        let found = matrix.transposed().and_then(|m| m.unprojected().ok());
+        found.is_some_and(|found| !found.is_sheared())
+    };
+    let are_all = sheared.all(is_turned);
+    let what = share_of(taken, |one| are_all && is_sheared(one))?;
     Some(format!(
         "{what} read as {} sheared, their transposes are not; --matrix-convention {} if they are \
          transposed",
@@ -342,8 +362,8 @@ fn transposed(cameras: &[Camera]) -> Option<String> {
 }
 
 /// Matrices that are no camera's.
-fn sheared(_: &Scene, cameras: &[Camera]) -> Option<String> {
-    let what = share_of(cameras, |camera| unstraight(camera).is_some())?;
+fn sheared(taken: &[Taken]) -> Option<String> {
+    let what = share_of(taken, is_sheared)?;
     Some(format!(
         "{what} sheared, or with an oblique near plane: image axes or depths at no right angles"
     ))
