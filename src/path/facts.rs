@@ -143,12 +143,17 @@ impl MatrixFacts {
 /// The up axis of their scene decides: an image is mirrored in a left-handed world too.
 /// Cameras that look straight down are for neither, and OpenGL has y upward.
 pub fn is_downward(taken: &[Taken], up: UpAxis) -> bool {
+    let is_from_zero = |found: &Unprojected| found.depths.contains(&0.0);
+    upward(taken, up, is_from_zero) < -SLANTED
+}
+
+/// Mean of the y axes of mirrored images along the up axis; NaN without such.
+fn upward(taken: &[Taken], up: UpAxis, is_one: impl Fn(&Unprojected) -> bool) -> f64 {
     let found = taken.iter().filter_map(|(_, found)| found.as_ref());
-    let mirrored = found.filter(|found| found.is_mirrored && found.depths.contains(&0.0));
-    let along: Vec<f64> = mirrored
-        .map(|found| found.image[1].dot(up.vector()))
-        .collect();
-    along.iter().sum::<f64>() < -SLANTED * along.len() as f64
+    let mirrored = found.filter(|found| found.is_mirrored && is_one(found));
+    let along = mirrored.map(|found| found.image[1].dot(up.vector()));
+    let [sum, count] = along.fold([0.0; 2], |[sum, count], along| [sum + along, count + 1.0]);
+    sum / count
 }
 
 /// Sine of the angle to straight up or down that decides which axis is up.
@@ -180,6 +185,7 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
             narrow(cameras),
             rolled(scene, &taken),
             sheared(&taken),
+            left_handed(scene, &taken),
             shallow(&taken),
             upward_parallel(scene, cameras),
             far_outside(scene, cameras),
@@ -367,6 +373,21 @@ fn sheared(taken: &[Taken]) -> Option<String> {
     Some(format!(
         "{what} sheared, or with an oblique near plane: image axes or depths at no right angles"
     ))
+}
+
+/// Matrices of a left-handed world beside a scene whose format is right-handed.
+fn left_handed(scene: &Scene, taken: &[Taken]) -> Option<String> {
+    let is_right_handed = scene.unit.is_some() || scene.surfaces.is_some();
+    let is_mirrored = |(_, found): &Taken| found.as_ref().is_some_and(|found| found.is_mirrored);
+    let is_left_handed =
+        taken.iter().all(is_mirrored) && upward(taken, scene.up, |_| true) > SLANTED;
+    (is_right_handed && is_left_handed).then(|| {
+        format!(
+            "all cameras mirrored, as in a left-handed world, of which {} is the mirror image; \
+             capture the boxes of that world instead",
+            scene.name
+        )
+    })
 }
 
 /// Eyes many scene diagonals away.

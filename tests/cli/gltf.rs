@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::FULL_CAMERA;
+use super::matrices::ENTRIES;
 use super::process::*;
 
 fn turned() -> String {
@@ -128,6 +129,22 @@ fn a_camera_with_another_up_is_not_told_of_an_option_that_its_format_excludes() 
     let warning = format!("c.csv: z is up in 1 of 1 camera, y in {}\n", turned());
     assert_eq!(done.code, Some(0), "{}", done.err);
     assert!(done.err.contains(&warning), "{}", done.err);
+}
+
+/// Looking along -z with y up, as in glTF and as in its mirror image.
+#[test]
+fn matrices_of_a_left_handed_world_are_told_of_beside_it() {
+    for (x, is_told) in [(1, false), (-1, true)] {
+        let row = format!("{x},0,0,0,0,1,0,-20,0,0,-1.02,28.6,0,0,-1,30");
+        let text = format!("{ENTRIES}\n{row}\n");
+        let folder = folder(&[("m.csv", text.as_bytes())]);
+        let line = format!(
+            "scene info {} --path m.csv --matrix-convention column-gl",
+            turned()
+        );
+        let told = cullbench(folder.path(), &line).err;
+        assert_eq!(told.contains("capture the boxes"), is_told, "{x}: {told}");
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::process::*;
 use super::{BOXES, EYE_LOOK};
 
-const ENTRIES: &str = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
+pub const ENTRIES: &str = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
 
 /// From (2, 3, 1) along +y with z up, 90 degrees, from 1 to 9 ahead: x to the
 /// right, z upward.
