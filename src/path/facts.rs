@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::calibrate::{MOST_TESTS, every_nth};
 use super::{CameraPath, LensDefaults};
 use crate::camera::{Camera, FARTHEST, Lens, LensKind, PlaneOptions, Unprojected, ViewProjection};
-use crate::input::note;
+use crate::geometry::Aabb;
+use crate::input::{names_file, note};
 use crate::scene::{Scene, UpAxis};
 use crate::shown::{counted, significant};
 
@@ -190,6 +191,7 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
             upward_parallel(scene, cameras),
             far_outside(scene, cameras),
             blind(scene, cameras),
+            coarse(scene, cameras).filter(|_| names_file(path)),
         ]
     };
     // The axes and the eye of a matrix that is read wrongly are no camera's.
@@ -416,6 +418,26 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         scene.name,
         significant(farthest)
     ))
+}
+
+/// Near planes that no file gives, in a scene of far smaller items.
+fn coarse(scene: &Scene, cameras: &[Camera]) -> Option<String> {
+    let defaults = LensDefaults::default().of_scene(scene);
+    let is_default = |lens: &&Lens| lens.near() == defaults.near_of(lens.far());
+    let near = cameras
+        .iter()
+        .map(|camera| &camera.lens)
+        .find(is_default)?
+        .near();
+    let is_smaller = |b: &&Aabb| f64::from(b.extent().max_element()) < near;
+    let (smaller, all) = (
+        scene.items.iter().filter(is_smaller).count(),
+        scene.items.len(),
+    );
+    (10 * smaller > 9 * all).then(|| {
+        let near = significant(near);
+        format!("near {near}, as none is given: larger than {smaller} of {all} items; --near if nearer ones count")
+    })
 }
 
 /// Views that all miss all items; of large scenes fewer views.

@@ -166,7 +166,7 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
 };
 
 /// Parameters that every generated path takes.
-pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
+pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000 (at most that of the default far), \
      far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that the six-plane test returns this share of the items on average, \
      false positives included, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
@@ -371,7 +371,7 @@ fn cameras_at(
     let [fovy_deg, aspect] = defaults.shape();
     let fovy_deg = spec.number("fovy", fovy_deg)?;
     let aspect = spec.number("aspect", aspect)?;
-    let near = near.unwrap_or(far.unwrap_or(natural) / 1000.0);
+    let near = near.unwrap_or(far.unwrap_or(natural).min(natural) / 1000.0);
     let visible = visible.transpose()?;
     spec.finish()?;
     // That of a place where no parameters replace it; a share of items replaces far.

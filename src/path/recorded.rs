@@ -56,7 +56,7 @@ impl LensDefaults {
     }
 
     /// Near plane of a recorded camera whose far plane may lie far behind the scene.
-    fn near_of(&self, far: Option<f64>) -> f64 {
+    pub(super) fn near_of(&self, far: Option<f64>) -> f64 {
         let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
         far.min(self.reach) / FAR_IN_NEARS
     }

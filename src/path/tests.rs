@@ -162,6 +162,9 @@ fn a_near_that_was_asked_for_stays_beside_a_visible_share() {
             assert_eq!(near, wanted.unwrap_or(far / 1000.0), "{source}");
         }
     }
+    // A farther far plane moves no near plane.
+    let near = |source| path(source, &scene).cameras[0].lens.near();
+    assert_eq!(near("orbit:frames=2,far=1e6"), near("orbit:frames=2"));
     let error = load("orbit:visible=5%,far=10", &scene, &plain).unwrap_err();
     let wanted = "far=10 beside visible=5%; expected one of them";
     assert!(error.to_string().contains(wanted), "{error}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::process::*;
-use super::{BOXES, FULL_CAMERA};
+use super::{BOXES, EYE_LOOK, FULL_CAMERA};
 
 /// Corners of random boxes, z up.
 fn corners() -> Vec<[i64; 6]> {
@@ -277,6 +277,27 @@ fn matrices_are_said_taken_apart() {
     assert!(words.contains("axes z up, in m"), "{words}");
     let lens = "recorded ones without a lens: 40 degrees, aspect 1.778, near 2, far 3879";
     assert!(words.contains(lens), "{words}");
+}
+
+#[test]
+fn a_near_plane_beyond_most_items_that_nobody_gave_is_doubted() {
+    let folder = both_axes();
+    let dome = [[-90_000, -90_000, -9000, 90_000, 90_000, 9000]];
+    let dome = table(BOXES, corners().into_iter().chain(dome));
+    let camera = format!("{EYE_LOOK}\n0,-90,0,0,0,0\n");
+    for (name, text) in [("dome.csv", dome), ("c.csv", camera)] {
+        std::fs::write(folder.path().join(name), text).expect("writable");
+    }
+    let wanted = "c.csv: near 510, as none is given: larger than 400 of 401 items";
+    for (options, is_told) in [
+        ("dome.csv", true),
+        ("dome.csv --near 1", false),
+        ("z.csv", false),
+    ] {
+        let line = format!("query --structure linear --cameras c.csv --scene {options}");
+        let told = cullbench(folder.path(), &line).err;
+        assert_eq!(told.contains(wanted), is_told, "{options}: {told}");
+    }
 }
 
 #[test]
