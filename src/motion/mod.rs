@@ -191,7 +191,17 @@ impl Motion {
     /// Warns or notes where frames and cameras without times differ in number.
     pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
-        let (seen, lines) = (self.frames * views.max(1), path.lines.len());
+        let views = views.max(1);
+        let (seen, lines) = (self.frames * views, path.lines.len());
+        let lengths: Vec<usize> = path.times.chunk_by(f64::eq).map(<[f64]>::len).collect();
+        if let [each, others @ ..] = &lengths[..]
+            && views % each > 0
+            && !others.is_empty()
+            && others.iter().all(|other| other == each)
+        {
+            let what = format_args!("{each} cameras at each time_s and {views} to a frame");
+            crate::input::warn(&format!("{path_name}: {what}; expected --views {each}"));
+        }
         let is_recorded = self.recorded().is_some();
         let frames = format!("{name}: its frames have {}", counted(seen, "view"));
         if is_recorded && path.times.is_empty() && ![0, seen].contains(&lines) {

@@ -132,6 +132,8 @@ fn times_and_cameras_that_are_not_used_are_said() {
         let rows = times.map(|time| format!("-9,0.5,0.5,0,0.5,0.5,{time}\n"));
         format!("{EYE_LOOK},time_s\n{}", rows.concat())
     };
+    let [zero, one] = ["0", "1"].map(|time| cameras([time; 3]));
+    let threes = zero + one.split_once('\n').expect("a header").1;
     let folder = folder(&[
         ("scene.csv", format!("{BOXES}\n0,0,0,1,1,1\n").as_bytes()),
         (
@@ -140,6 +142,7 @@ fn times_and_cameras_that_are_not_used_are_said() {
         ),
         ("all.csv", cameras(["0", "1", "2"]).as_bytes()),
         ("some.csv", cameras(["0", "", "2"]).as_bytes()),
+        ("threes.csv", threes.as_bytes()),
         (
             "motion.csv",
             format!("time_s,id,{BOUNDS}\n0,0,0,0,0,1,1,2\n").as_bytes(),
@@ -157,6 +160,10 @@ fn times_and_cameras_that_are_not_used_are_said() {
             "the last 1 of 3 cameras of 'all.csv' fill no frame of 2",
         ),
         ("some", "some.csv: time_s is empty in 1 of 3 rows"),
+        (
+            "threes",
+            "threes.csv: 3 cameras at each time_s and 2 to a frame; expected --views 3",
+        ),
     ] {
         let done = cullbench(
             folder.path(),
