@@ -106,6 +106,12 @@ impl ViewProjection {
         self.rows[..3].iter().all(is_unit) && self.rows[3] == [0.0, 0.0, 0.0, 1.0]
     }
 
+    /// Returns whether it has a lens alone: the eye at 0 and the axes of the world.
+    pub fn is_lone(&self) -> bool {
+        let [x, y, z, w] = self.rows;
+        [x[1], x[3], y[0], y[3], z[0], z[1], w[0], w[1], w[3]] == [0.0; 9]
+    }
+
     /// Clip-space depths of the near and the far plane.
     fn depths(&self) -> [f64; 2] {
         let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };

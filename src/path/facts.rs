@@ -242,8 +242,14 @@ fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
     (count > 0).then(|| share(count, cameras))
 }
 
-/// View matrices without a projection, which see two units of width and height.
+/// View matrices without a projection, which see two units of width and height, and
+/// projections without a view.
 fn bare(cameras: &[Camera]) -> Option<String> {
+    let is_lone = |camera: &Camera| camera.lens.matrix().is_some_and(ViewProjection::is_lone);
+    if !cameras.is_empty() && cameras.iter().all(is_lone) {
+        let what = "all matrices with the eye at 0 and the axes of the world, as without a view";
+        return Some(format!("{what}; expected projection x view"));
+    }
     let is_bare = |camera: &&Camera| camera.lens.matrix().is_some_and(ViewProjection::is_bare);
     let what = share_of(cameras, is_bare)?;
     Some(format!(

@@ -173,6 +173,8 @@ fn every_command_that_reads_a_scene_takes_up() {
 const MATRIX: &str = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
 /// From (2, 3, 1) along +y with z up, 90 degrees, from 1 to 9 ahead, depth -1 to 1.
 const GL: &str = "1,0,0,-2,0,0,1,-1,0,1.25,0,-6,0,1,0,-3";
+/// A lens without a view.
+const LONE: &str = "1,0,0,0,0,1,0,0,0,0,-1.02,-2.02,0,0,-1,0";
 /// The axis of x leans towards z.
 const SHEARED: &str = "1,0,0.5,-2,0,0,1,-1,0,1.25,0,-6,0,1,0,-3";
 
@@ -318,6 +320,7 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
         ("away.csv", camera("0,-90,0,0,-91,0", "0,0,1")),
         ("sheared.csv", format!("{MATRIX}\n{GL}\n{SHEARED}\n")),
         ("gl.csv", format!("{MATRIX}\n{GL}\n")),
+        ("lone.csv", format!("{MATRIX}\n{LONE}\n")),
     ];
     for (name, text) in &files {
         std::fs::write(folder.path().join(name), text).expect("writable");
@@ -355,6 +358,11 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
              --matrix-convention column-gl",
         ),
         ("gl.csv --matrix-convention column-gl", ""),
+        (
+            "lone.csv --matrix-convention column-gl",
+            "lone.csv: all matrices with the eye at 0 and the axes of the world, as without a view; \
+             expected projection x view",
+        ),
         ("outside:frames=4", ""),
     ] {
         let line = format!("query --scene z.csv --structure linear --cameras {cameras}");
