@@ -51,8 +51,16 @@ impl<'b> TableReader<'b> {
         let no_text = |at: usize, found: &str| {
             InputError::line(file, lines(&bytes[..at]) + 1, found, "UTF-8 text")
         };
-        if bytes.starts_with(b"\x1f\x8b") {
-            return Err(no_text(0, "gzip, which is not read"));
+        const OTHERS: [(&[u8], &str); 3] = [
+            (b"\x1f\x8b", "gzip, which is not read"),
+            (b"PK\x03\x04", "a zip archive, no table"),
+            (
+                b"glTF",
+                "binary glTF, no table (its cameras are the path places)",
+            ),
+        ];
+        if let Some((_, found)) = OTHERS.iter().find(|other| bytes.starts_with(other.0)) {
+            return Err(no_text(0, found));
         }
         if let Some(zero) = bytes.iter().position(|byte| *byte == 0) {
             return Err(no_text(zero, "zero bytes, as in UTF-16 text"));

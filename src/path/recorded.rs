@@ -7,7 +7,7 @@ use crate::camera::{
     Camera, CameraError, FARTHEST, Frame, Lens, LensKind, MATRIX_CONVENTIONS, MATRIX_ENTRIES,
     MatrixConvention, look_at,
 };
-use crate::input::{InputError, Result, Row, TableReader, note};
+use crate::input::{InputError, Result, Row, TableReader, finite, note};
 use crate::scene::{Scene, WorldBox, memory};
 use crate::shown::shortened;
 
@@ -175,8 +175,10 @@ const OF_EYES: [&str; 17] = [
 const TIME: (&str, &str) = ("time", "time_s");
 
 /// Columns that other programs write, and those that say the same.
-const SYNONYMS: [(&str, &str); 4] = [
+const SYNONYMS: [(&str, &str); 6] = [
     TIME,
+    ("fovx_deg", "fovy_deg, the vertical one"),
+    ("hfov", "fovy_deg, the vertical one"),
     ("roll", "up_x,up_y,up_z"),
     ("pitch", "forward_x,forward_y,forward_z"),
     ("yaw", "forward_x,forward_y,forward_z"),
@@ -216,6 +218,15 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         let expected = "a place to look at or a direction, not both";
         return Err(table.error("columns look_* and forward_*", expected));
     }
+    if !has_look && !by_forward {
+        let found = format!(
+            "no column 'look_x' or 'forward_x' in '{}'",
+            shortened(&table.header.join(","), 60)
+        );
+        let expected =
+            "look_x,look_y,look_z (a place) or forward_x,forward_y,forward_z (a direction)";
+        return Err(table.error(found, expected));
+    }
     let target = if by_forward { forward? } else { look? };
     let up = has_up.then_some(up).transpose()?;
     let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
@@ -236,7 +247,9 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
                     .ok()
                     .filter(|far: &f64| *far > f64::NEG_INFINITY);
                 let found = || format!("far '{}'", shortened(text, 60));
-                let refused = || row.error(found(), "a number above 0, inf or nothing");
+                let comma = finite(text).err().filter(|_| text.contains(','));
+                let expected = comma.unwrap_or("a number above 0, inf or nothing");
+                let refused = || row.error(found(), expected);
                 let far = far.ok_or_else(refused)?;
                 Some(far).filter(|far| far.is_finite())
             }
@@ -436,8 +449,8 @@ mod tests {
     fn columns_that_are_not_read_are_told_once() {
         static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
         tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
-        let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,time_s,fov,Far,zfar,ortho_size,roll,,name,size\n\
-                       0,0,0,1,0,0,0,90,9,9,9,0,,a,1\n";
+        let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,time_s,fov,Far,zfar,ortho_size,roll,,name,size,hfov\n\
+                       0,0,0,1,0,0,0,90,9,9,9,0,,a,1,90\n";
         let points = "x,y,z,X\n1,2,3,4\n";
         let boxes = "min_x,min_y,min_z,max_x,max_y,max_z,Min_X,max_speed\n0,0,0,1,1,1,2,3\n";
         for _ in 0..2 {
@@ -455,7 +468,8 @@ mod tests {
             [
                 "note: note-c.csv, line 1: columns that are not read: 'fov' (did you mean 'fovy_deg'?), \
                  'Far' (did you mean 'far'?), 'zfar' (did you mean 'far'?), 'ortho_size' (did you \
-                 mean 'ortho_height'?), 'roll' (did you mean 'up_x,up_y,up_z'?), 'size'",
+                 mean 'ortho_height'?), 'roll' (did you mean 'up_x,up_y,up_z'?), 'size', \
+                 'hfov' (did you mean 'fovy_deg, the vertical one'?)",
                 "note: note-p.csv, line 1: columns that are not read: 'X' (did you mean 'x'?)",
                 "note: note-b.csv: column 'Min_X' is kept as a label beside 'min_x'",
             ]

@@ -188,7 +188,7 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
 #[test]
 fn cameras_that_are_none_are_refused_with_line_and_rule() {
     let good = "0,0,0,1,0,0,0,0,1,60,1,1,9";
-    let full: [(&str, &str); 14] = [
+    let full: [(&str, &str); 15] = [
         ("0,0,zero,1,0,0,0,0,1,60,1,1,9", "eye_z 'zero'"),
         ("0,0,nan,1,0,0,0,0,1,60,1,1,9", "eye_z 'nan'"),
         ("0,0,0,inf,0,0,0,0,1,60,1,1,9", "look_x 'inf'"),
@@ -200,6 +200,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ("0,0,0,1,0,0,0,0,1,60,1,10,9", "expected near < far"),
         ("0,0,0,1,0,0,0,0,1,60,1,0,9", "near is 0 | near > 0"),
         ("0,0,0,1,0,0,0,0,1,60,1,1,nan", "far 'nan' | inf or nothing"),
+        (
+            "0,0,0,1,0,0,0,0,1,60,1,1,\"100,5\"",
+            "far '100,5' | a decimal comma",
+        ),
         ("0,0,0,0,0,2,0,0,1,60,1,1,9", "up | parallel"),
         ("0,0,0,0,0,0,0,0,1,60,1,1,9", "eye and look | same"),
         ("0,0,0,1,0,0,0,0,1,60,1,1", "12 fields | expected 13"),
@@ -217,7 +221,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         (b"\n\n\n", "empty file"),
         (FULL_CAMERA.as_bytes(), "line 2 | no camera"),
         (b"x,y,z\n1,2,3\n", "line 1 | no column 'eye_x'"),
-        (b"eye_x,eye_y,eye_z\n1,2,3\n", "line 1 | 'look_x'"),
+        (
+            b"eye_x,eye_y,eye_z\n1,2,3\n",
+            "line 1 | 'look_x' or 'forward_x' in 'eye_x,eye_y,eye_z' | direction",
+        ),
         (
             b"eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x\n0,0,0,1,0,0,0\n",
             "line 1 | no column 'up_y'",

@@ -163,7 +163,15 @@ fn text_of_another_form_is_named() {
         units.flat_map(to).collect::<Vec<u8>>()
     };
     let (little, big) = (utf16(u16::to_le_bytes), utf16(u16::to_be_bytes));
-    let cases: [(&[u8], &str); 12] = [
+    let cases: [(&[u8], &str); 14] = [
+        (
+            b"PK\x03\x04\0",
+            "line 1: a zip archive, no table; expected UTF-8",
+        ),
+        (
+            b"glTF\x02\0\0\0",
+            "line 1: binary glTF, no table (its cameras are",
+        ),
         (
             &little,
             "line 1: zero bytes, as in UTF-16 text; expected UTF-8",
