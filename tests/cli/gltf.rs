@@ -115,6 +115,22 @@ fn notes_tell_of_what_is_not_read_as_drawn() {
     .unwrap();
     let told = cullbench(folder.path(), "scene info s.gltf").err;
     assert!(told.contains(notes[0]) && !told.contains("moves"), "{told}");
+    // Nor do channels of other properties, with a node or without.
+    let other = text.replace(
+        r#""scenes""#,
+        r#""extensionsUsed": ["KHR_animation_pointer"], "scenes""#,
+    );
+    let other = other.replace("[0, 1]}]", "[0]}]");
+    for target in [r#"1, "path": "pointer""#, r#"null, "path": "pointer""#] {
+        let text = other.replace(r#"0, "path": "rotation""#, target);
+        fs::write(folder.path().join("s.gltf"), text).unwrap();
+        let told = cullbench(folder.path(), "scene info s.gltf").err;
+        let note = "KHR_animation_pointer is not read: what it moves stays as it is stored";
+        assert!(
+            told.contains(note) && !told.contains("morph") && !told.contains("that an"),
+            "{told}"
+        );
+    }
 }
 
 #[test]

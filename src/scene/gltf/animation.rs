@@ -247,7 +247,7 @@ impl File<'_> {
     }
 }
 
-/// Part of a transform that a channel moves; `None` for weights of morph targets.
+/// Part of a transform that a channel moves; `None` for another property.
 pub fn part(channel: &Channel) -> Option<usize> {
     match channel.target.path {
         Checked::Valid(Property::Translation) => Some(0),
