@@ -24,8 +24,6 @@ pub struct Unprojected {
     ///
     /// The eye of an orthographic lens is the centre of the near plane.
     pub camera: Camera,
-    /// Clip-space depths of the near and the far plane: -1, 0 or 1.
-    pub depths: [f64; 2],
     /// True if the image is mirrored.
     ///
     /// y points down (Vulkan), or the world is left-handed.
@@ -54,7 +52,6 @@ impl ViewProjection {
     /// # Errors
     /// A view that no lens holds, such as one with near and far plane in one place.
     pub fn unprojected(&self) -> Result<Unprojected> {
-        let depths = self.depths();
         let along = |row: usize| DVec3::from_slice(&self.rows[row]);
         let [x, y, z, w] = [0, 1, 2, 3].map(along);
         // Without an exact inverse where far is clearly farther from an eye than near.
@@ -92,7 +89,6 @@ impl ViewProjection {
         let change = if parallel.is_some() { z } else { w };
         Ok(Unprojected {
             camera: Camera { frame, lens },
-            depths,
             is_mirrored,
             image,
             shear: image[0].dot(image[1]).abs(),
@@ -112,8 +108,8 @@ impl ViewProjection {
         [x[1], x[3], y[0], y[3], z[0], z[1], w[0], w[1], w[3]] == [0.0; 9]
     }
 
-    /// Clip-space depths of the near and the far plane.
-    fn depths(&self) -> [f64; 2] {
+    /// Clip-space depths of the near and the far plane: -1, 0 or 1.
+    pub fn depths(&self) -> [f64; 2] {
         let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };
         match self.is_reversed {
             false => [lowest, 1.0],
@@ -259,7 +255,7 @@ mod tests {
                         let side = if is_swapped { -1.0 } else { 1.0 };
                         let [near, far] = depths;
                         let wanted = if is_swapped { [far, near] } else { depths };
-                        assert_eq!(found.depths, wanted, "{what}");
+                        assert_eq!(read.lens.matrix().unwrap().depths(), wanted, "{what}");
                         assert_eq!(found.is_mirrored, hand * side < 0.0, "{what}");
                         let along = found.camera.frame.forward() - frame.forward() * side;
                         assert!(along.length() < slack, "{what}");

@@ -244,8 +244,7 @@ fn clip_matrix(camera: &Camera, origin: DVec3, is_downward: bool) -> DMat4 {
         return camera.lens.projection(ClipSpace::OpenGl) * view;
     };
     let [x, y, z, w] = matrix.rows().map(DVec4::from);
-    let lowest = if matrix.is_from_zero() { 0.0 } else { -1.0 };
-    let [near, far] = (matrix.unprojected()).map_or([lowest, 1.0], |found| found.depths);
+    let [near, far] = matrix.depths();
     let z = (2.0 * z - (near + far) * w) / (far - near);
     // The page draws y upward, also for Vulkan.
     let y = if is_downward { -y } else { y };

@@ -193,11 +193,11 @@ impl Motion {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
         let views = views.max(1);
         let (seen, lines) = (self.frames * views, path.lines.len());
-        let lengths: Vec<usize> = path.times.chunk_by(f64::eq).map(<[f64]>::len).collect();
-        if let [each, others @ ..] = &lengths[..]
+        let mut each: Vec<usize> = path.times.chunk_by(f64::eq).map(<[f64]>::len).collect();
+        each.dedup();
+        if let [each] = each[..]
             && views % each > 0
-            && !others.is_empty()
-            && others.iter().all(|other| other == each)
+            && each < path.times.len()
         {
             let what = format_args!("{each} cameras at each time_s and {views} to a frame");
             crate::input::warn(&format!("{path_name}: {what}; expected --views {each}"));

@@ -61,10 +61,8 @@ type Taken<'a> = (&'a Camera, Option<Box<Unprojected>>);
 
 /// Matrices as frames and lenses, computed exactly: once for all facts and doubts.
 pub fn taken_apart(cameras: &[Camera]) -> Vec<Taken<'_>> {
-    let of = |camera: &Camera| camera.lens.matrix()?.unprojected().ok();
-    let all = cameras.iter();
-    all.map(|camera| (camera, of(camera).map(Box::new)))
-        .collect()
+    let of = |camera: &Camera| Some(Box::new(camera.lens.matrix()?.unprojected().ok()?));
+    cameras.iter().map(|camera| (camera, of(camera))).collect()
 }
 
 impl CameraFacts {
@@ -73,9 +71,8 @@ impl CameraFacts {
         let taken = taken_apart(cameras);
         let one = |(camera, found): &Taken| {
             // Of a matrix without a lens the matrix itself.
-            let lens = found
-                .as_ref()
-                .map_or(camera.lens, |found| found.camera.lens);
+            let own = |found: &Box<Unprojected>| found.camera.lens;
+            let lens = found.as_ref().map_or(camera.lens, own);
             let height = lens.height_at(1.0).filter(|_| lens.is_orthographic());
             let [fovy_deg, aspect] = shape(&lens);
             let values = [fovy_deg, height, aspect, Some(lens.near())];
@@ -128,7 +125,7 @@ impl MatrixFacts {
         let [eye, right, up, forward] = axes.map(|v| v.to_array());
         Some(MatrixFacts {
             convention: matrix.convention().name().to_owned(),
-            depth: found.depths,
+            depth: matrix.depths(),
             is_orthographic: found.camera.lens.is_orthographic(),
             eye,
             right,
@@ -144,14 +141,14 @@ impl MatrixFacts {
 /// The up axis of their scene decides: an image is mirrored in a left-handed world too.
 /// Cameras that look straight down are for neither, and OpenGL has y upward.
 pub fn is_downward(taken: &[Taken], up: UpAxis) -> bool {
-    let is_from_zero = |found: &Unprojected| found.depths.contains(&0.0);
-    upward(taken, up, is_from_zero) < -SLANTED
+    let mut matrices = taken.iter().filter_map(|(camera, _)| camera.lens.matrix());
+    matrices.all(ViewProjection::is_from_zero) && upward(taken, up) < -SLANTED
 }
 
 /// Mean of the y axes of mirrored images along the up axis; NaN without such.
-fn upward(taken: &[Taken], up: UpAxis, is_one: impl Fn(&Unprojected) -> bool) -> f64 {
+fn upward(taken: &[Taken], up: UpAxis) -> f64 {
     let found = taken.iter().filter_map(|(_, found)| found.as_ref());
-    let mirrored = found.filter(|found| found.is_mirrored && is_one(found));
+    let mirrored = found.filter(|found| found.is_mirrored);
     let along = mirrored.map(|found| found.image[1].dot(up.vector()));
     let [sum, count] = along.fold([0.0; 2], |[sum, count], along| [sum + along, count + 1.0]);
     sum / count
@@ -179,29 +176,24 @@ const FAR_OUTSIDE: f64 = 3.0;
 
 /// One line for each kind of doubt about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
-    let taken = taken_apart(cameras);
-    let found = || {
-        [
-            bare(cameras),
-            narrow(cameras),
-            rolled(scene, &taken),
-            sheared(&taken),
-            left_handed(scene, &taken),
-            shallow(&taken),
-            upward_parallel(scene, cameras),
-            far_outside(scene, cameras),
-            blind(scene, cameras),
-            coarse(scene, cameras).filter(|_| names_file(path)),
-        ]
-    };
+    let (taken, told) = (taken_apart(cameras), |doubt| format!("{path}: {doubt}"));
     // The axes and the eye of a matrix that is read wrongly are no camera's.
-    let only = transposed(&taken);
-    let found = only.map_or_else(|| found().into(), |only| vec![Some(only)]);
-    let found = found
-        .iter()
-        .flatten()
-        .map(|doubt| format!("{path}: {doubt}"));
-    found.collect()
+    if let Some(only) = transposed(&taken) {
+        return vec![told(only)];
+    }
+    let doubts = [
+        bare(cameras),
+        narrow(cameras),
+        rolled(scene, &taken),
+        sheared(&taken),
+        left_handed(scene, &taken),
+        shallow(&taken),
+        upward_parallel(scene, cameras),
+        far_outside(scene, cameras),
+        blind(scene, cameras),
+        coarse(scene, cameras).filter(|_| names_file(path)),
+    ];
+    doubts.into_iter().flatten().map(told).collect()
 }
 
 impl LensDefaults {
@@ -333,16 +325,13 @@ fn rolled(scene: &Scene, taken: &[Taken]) -> Option<String> {
 
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
 fn shallow(taken: &[Taken]) -> Option<String> {
-    let is_shallow = |taken: &&Taken| {
-        let camera = taken.0;
+    let is_shallow = |one: &&Taken| {
+        let Camera { frame, lens } = one.0;
         // An oblique near plane has depth -1, and often no far plane.
-        let is_read = |m: &&ViewProjection| !m.is_from_zero() && !is_sheared(taken);
-        let Some(matrix) = camera.lens.matrix().filter(is_read) else {
-            return false;
-        };
-        let [_, _, z, w] = matrix.rows();
-        let along = |row: &[f64; 4]| DVec3::from_slice(row).dot(camera.frame.forward());
-        camera.lens.far().is_none() && (along(z) / along(w)).abs() < 0.5
+        let is_read = lens.far().is_none() && !is_sheared(one);
+        let matrix = lens.matrix().filter(|m| is_read && !m.is_from_zero());
+        let along = |row: [f64; 4]| DVec3::from_slice(&row).dot(frame.forward());
+        matrix.is_some_and(|m| (along(m.rows()[2]) / along(m.rows()[3])).abs() < 0.5)
     };
     let what = share_of(taken, is_shallow)?;
     Some(format!(
@@ -387,15 +376,9 @@ fn sheared(taken: &[Taken]) -> Option<String> {
 fn left_handed(scene: &Scene, taken: &[Taken]) -> Option<String> {
     let is_right_handed = scene.unit.is_some() || scene.surfaces.is_some();
     let is_mirrored = |(_, found): &Taken| found.as_ref().is_some_and(|found| found.is_mirrored);
-    let is_left_handed =
-        taken.iter().all(is_mirrored) && upward(taken, scene.up, |_| true) > SLANTED;
-    (is_right_handed && is_left_handed).then(|| {
-        format!(
-            "all cameras mirrored, as in a left-handed world, of which {} is the mirror image; \
-             capture the boxes of that world instead",
-            scene.name
-        )
-    })
+    let is_left_handed = taken.iter().all(is_mirrored) && upward(taken, scene.up) > SLANTED;
+    let what = "all cameras mirrored, as in a left-handed world; capture its boxes instead of";
+    (is_right_handed && is_left_handed).then(|| format!("{what} {}, its mirror image", scene.name))
 }
 
 /// Eyes many scene diagonals away.
@@ -429,21 +412,14 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 /// Near planes that no file gives, in a scene of far smaller items.
 fn coarse(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let defaults = LensDefaults::default().of_scene(scene);
-    let is_default = |lens: &&Lens| lens.near() == defaults.near_of(lens.far());
-    let near = cameras
-        .iter()
-        .map(|camera| &camera.lens)
-        .find(is_default)?
-        .near();
+    let default = |lens: &Lens| defaults.near_of(lens.far());
+    let is_default = |camera: &&Camera| camera.lens.near() == default(&camera.lens);
+    let near = cameras.iter().find(is_default)?.lens.near();
     let is_smaller = |b: &&Aabb| f64::from(b.extent().max_element()) < near;
-    let (smaller, all) = (
-        scene.items.iter().filter(is_smaller).count(),
-        scene.items.len(),
-    );
-    (10 * smaller > 9 * all).then(|| {
-        let near = significant(near);
-        format!("near {near}, as none is given: larger than {smaller} of {all} items; --near if nearer ones count")
-    })
+    let smaller = scene.items.iter().filter(is_smaller).count();
+    let (near, all) = (significant(near), scene.items.len());
+    let what = format!("near {near}, as none is given: larger than {smaller} of {all} items");
+    (10 * smaller > 9 * all).then(|| what + "; --near if nearer ones count")
 }
 
 /// Views that all miss all items; of large scenes fewer views.

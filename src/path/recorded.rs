@@ -106,8 +106,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
             last = row.time(column, last)?;
             times.push(last);
         }
-        let camera = read(row)?.map_err(|error| refused(row, &error))?;
-        Ok((row.line, camera))
+        Ok((row.line, read(row)?))
     })?
     .into_iter()
     .unzip();
@@ -131,7 +130,7 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
 }
 
 /// Makes the camera of a row, from the columns of one kind of file.
-type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Result<Camera, CameraError>> + 'a>;
+type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Camera> + 'a>;
 
 /// Bytes of a row in what callers make of it, such as views.
 const BESIDE: usize = 64;
@@ -157,7 +156,7 @@ fn rows<T>(
 }
 
 /// The error of a row whose numbers make no camera.
-fn refused(row: &Row, error: &CameraError) -> InputError {
+fn refused(row: &Row, error: CameraError) -> InputError {
     match error {
         CameraError::Invalid { found, expected } => row.error(found, expected),
         other => row.error(other, "a camera"),
@@ -200,7 +199,7 @@ fn matrices<'a>(
     })?;
     Ok(Box::new(move |row| {
         let entries = bytemuck::cast(row.finite_numbers(&columns)?);
-        Ok(Camera::of_matrix(entries, convention))
+        Camera::of_matrix(entries, convention).map_err(|error| refused(row, error))
     }))
 }
 
@@ -219,13 +218,9 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         return Err(table.error("columns look_* and forward_*", expected));
     }
     if !has_look && !by_forward {
-        let found = format!(
-            "no column 'look_x' or 'forward_x' in '{}'",
-            shortened(&table.header.join(","), 60)
-        );
-        let expected =
-            "look_x,look_y,look_z (a place) or forward_x,forward_y,forward_z (a direction)";
-        return Err(table.error(found, expected));
+        let all = shortened(&table.header.join(","), 60);
+        let found = format_args!("no column 'look_x' or 'forward_x' in '{all}'");
+        return Err(table.error(found, "columns look_* (a place) or forward_* (a direction)"));
     }
     let target = if by_forward { forward? } else { look? };
     let up = has_up.then_some(up).transpose()?;
@@ -277,17 +272,16 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
             let lens = Lens::new(kind, near, far)?;
             Ok(Camera { frame, lens })
         });
-        Ok(camera.map_err(|error| {
-            let CameraError::Invalid { found, expected } = error else {
-                return error;
-            };
-            let expected = match expected {
-                _ if !has_up && found.starts_with("up is") => "columns up_x,up_y,up_z",
-                "near < far" if by_scene => "near < far: a column far, or --far",
-                other => other,
-            };
-            CameraError::Invalid { found, expected }
-        }))
+        camera.map_err(|mut error| {
+            if let CameraError::Invalid { found, expected } = &mut error {
+                *expected = match *expected {
+                    _ if !has_up && found.starts_with("up is") => "columns up_x,up_y,up_z",
+                    "near < far" if by_scene => "near < far: a column far, or --far",
+                    other => other,
+                };
+            }
+            refused(row, error)
+        })
     }))
 }
 

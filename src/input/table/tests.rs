@@ -170,7 +170,7 @@ fn text_of_another_form_is_named() {
         ),
         (
             b"glTF\x02\0\0\0",
-            "line 1: binary glTF, no table (its cameras are",
+            "line 1: binary glTF; its cameras are path places",
         ),
         (
             &little,

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use gltf::json::animation::{Channel, Property};
 use gltf::json::validation::Checked;
 
 use super::animation::part;
@@ -18,9 +17,6 @@ use crate::shown::{counted, first_of, shortened};
 #[rustfmt::skip]
 const HARMLESS: [&str; 7] =
     ["compression", "instancing", "lights", "materials", "quantization", "texture", "visibility"];
-
-/// Channels with a path to any property in place of a node.
-const POINTER: &str = "KHR_animation_pointer";
 
 impl File<'_> {
     /// Marks the nodes of a kind and all nodes below them.
@@ -57,12 +53,11 @@ impl File<'_> {
     pub fn note_unread(&self, placed: &[Placed], order: &Order, cameras: usize) {
         let (root, nodes) = (&self.root, &self.root.nodes);
         let channels = root.animations.iter().flat_map(|clip| &clip.channels);
-        let targets = |is: &dyn Fn(&Channel) -> bool| -> HashSet<usize> {
-            channels.clone().filter(|c| is(c)).map(|c| c.target.node.value()).collect()
-        };
-        let weights = Checked::Valid(Property::MorphTargetWeights);
-        let [moving, morphing] =
-            [targets(&|c| part(c).is_some()), targets(&|c| c.target.path == weights)];
+        let channels = channels.filter(|c| matches!(c.target.path, Checked::Valid(_)));
+        let (moving, morphing): (Vec<_>, Vec<_>) = channels.partition(|c| part(c).is_some());
+        let [moving, morphing] = [moving, morphing].map(|channels| -> HashSet<usize> {
+            channels.into_iter().map(|c| c.target.node.value()).collect()
+        });
         let moved = self.below(order, |node| moving.contains(&node));
         let hidden = self.below(order, |node| {
             let own = nodes[node].extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
@@ -86,8 +81,9 @@ impl File<'_> {
             (root.scenes.len().saturating_sub(1), "further scene", "not read"),
             (meshes - read(&has_mesh), "node", "with a mesh outside of the scene, not read"),
         ]);
-        if root.extensions_used.iter().any(|name| name == POINTER) {
-            note(&format!("{}: {POINTER} is not read: what it moves stays as it is stored", self.name));
+        if root.extensions_used.iter().any(|name| name == "KHR_animation_pointer") {
+            let what = "KHR_animation_pointer is not read: what it moves stays as it is stored";
+            note(&format!("{}: {what}", self.name));
         }
         let is_unknown = |name: &&String| !HARMLESS.iter().any(|part| name.contains(part));
         let required = root.extensions_required.iter().filter(is_unknown);
