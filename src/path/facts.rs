@@ -116,12 +116,8 @@ impl MatrixFacts {
         let (frame, [x, y]) = (found.camera.frame, found.image);
         let y = if is_downward(taken, up) { -y } else { y };
         let along = |axis: DVec3, image: DVec3| axis * axis.dot(image).signum();
-        let axes = [
-            frame.eye,
-            along(frame.u(), x),
-            along(frame.v(), y),
-            frame.forward(),
-        ];
+        let (right, up) = (along(frame.u(), x), along(frame.v(), y));
+        let axes = [frame.eye, right, up, frame.forward()];
         let [eye, right, up, forward] = axes.map(|v| v.to_array());
         Some(MatrixFacts {
             convention: matrix.convention().name().to_owned(),

@@ -159,7 +159,7 @@ fn matrices_of_a_left_handed_world_are_told_of_beside_it() {
             turned()
         );
         let told = cullbench(folder.path(), &line).err;
-        assert_eq!(told.contains("capture the boxes"), is_told, "{x}: {told}");
+        assert_eq!(told.contains("capture its boxes"), is_told, "{x}: {told}");
     }
 }
 
