@@ -290,9 +290,9 @@ pub struct LensArgs {
     /// Width / height for cameras without one [default: 16:9, 1.778]
     #[arg(long, value_parser = values::above_zero)]
     pub aspect: Option<f64>,
-    /// Near plane for cameras without one [default: far / 1000, of the default far if that
-    /// is nearer, 0.1 for street; for recorded cameras at most twice the scene's diagonal
-    /// / 1000]
+    /// Near plane for cameras without one [default: far / 1000, 0.1 for street; at
+    /// most that of the default far, for recorded cameras twice the scene's diagonal /
+    /// 1000]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 counts as inf [default:

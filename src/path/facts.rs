@@ -56,7 +56,9 @@ pub struct MatrixFacts {
     pub is_mirrored: bool,
 }
 
-/// A camera, and what its matrix was made of: `None` for other cameras and without a lens.
+/// A camera, and what its matrix was made of.
+///
+/// `None` for other cameras and for a matrix without a lens.
 type Taken<'a> = (&'a Camera, Option<Box<Unprojected>>);
 
 /// Matrices as frames and lenses, computed exactly: once for all facts and doubts.
