@@ -294,7 +294,7 @@ const KEPT: &str =
 fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let program = report.run.command.split(' ').next()?;
     let all = comparisons(report);
-    let first = all.iter().find(|c| c.winners().next().is_some())?.about();
+    let first = all.iter().find(|c| c.decides())?.about();
     if report.run.suite.is_some() {
         let gives = "the same for a scene of your own";
         return Some(format!("next    {program} run --scene FILE  {gives}"));

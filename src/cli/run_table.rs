@@ -222,7 +222,8 @@ pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Tab
                 (_, Some(speedup)) => text::significant(speedup.value),
                 (_, None) => text::some(cell.time(), |time| text::time(time.value)),
             };
-            let mark = if cell.rank == Some(1) { "*" } else { "" };
+            let is_first = cell.rank == Some(1) && !comparison.is_blind();
+            let mark = if is_first { "*" } else { "" };
             format!("{mark}{shown}")
         };
         let figures = columns.iter().map(|standing| figure(standing.structure));

@@ -39,6 +39,7 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
     let base = overall.base;
     let (first, is_alone) = match all {
         [one] => (ranking(one, base), one.sound().nth(1).is_none()),
+        _ if all.iter().all(|c| c.is_blind()) => (BLIND.to_owned(), true),
         _ => (standing(all, overall), overall.standings.len() < 2),
     };
     let mut told = vec![first];
@@ -49,7 +50,7 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
         ));
     }
     if let [one] = all {
-        told.extend(repaid(one, base).filter(|_| !is_blind(one)));
+        told.extend(repaid(one, base).filter(|_| !one.is_blind()));
     }
     told.extend(checked(all));
     told.extend(failed(all));
@@ -160,10 +161,8 @@ fn on_one_thread(label: &str) -> Option<String> {
 /// Wall times nearer than this are the layout of memory.
 const LEAST_GAIN: f64 = 1.05;
 
-/// Returns true if the fastest of empty answers is no advice.
-fn is_blind(comparison: &Comparison) -> bool {
-    comparison.of_any("visible_count") == Some(0.0)
-}
+/// Conclusion where no camera sees an item.
+pub const BLIND: &str = "Nothing is to be taken: no camera sees an item (see the warnings).";
 
 fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     let winners: Vec<&ReportCell> = comparison.winners().collect();
@@ -176,8 +175,8 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         };
         return format!("Nothing is ranked: {why}.");
     };
-    if is_blind(comparison) {
-        return "Nothing is to be taken: no camera sees an item (see the warnings).".to_owned();
+    if comparison.is_blind() {
+        return BLIND.to_owned();
     }
     let next = comparison.sound().nth(winners.len());
     // Noise alone may tie the fastest with what is slower than the next best.
@@ -324,8 +323,15 @@ fn standing(all: &[&Comparison], overall: &Overall) -> String {
         told += &format!("{whose} {}", leads.join(", "));
     }
     let firsts: Vec<String> = tied.iter().map(|s| s.first_in.to_string()).collect();
-    let all = all.iter().filter(|c| c.winners().next().is_some()).count();
-    told += &format!("; first or tied in {} of {all}.", listed(&firsts, "and"));
+    let deciding = all.iter().filter(|c| c.decides()).count();
+    told += &format!(
+        "; first or tied in {} of {deciding}.",
+        listed(&firsts, "and")
+    );
+    let blind = all.iter().filter(|c| c.is_blind()).count();
+    told += &text::any(blind, "row", |rows| {
+        format!(" {rows} left out: no camera sees an item.")
+    });
     let apart = overall.standings.iter();
     let apart = apart.filter(|s| s.speedup.is_none() && s.first_in > 0);
     let apart = apart.map(|s| format!("{} (first or tied in {})", s.structure, s.first_in));

@@ -63,6 +63,16 @@ impl<'r> Comparison<'r> {
         self.sound().filter(|cell| cell.rank == Some(1))
     }
 
+    /// Returns true if no camera sees an item.
+    pub fn is_blind(&self) -> bool {
+        self.of_any("visible_count") == Some(0.0)
+    }
+
+    /// Returns true if its ranks tell anything: the fastest of empty answers is no advice.
+    pub fn decides(&self) -> bool {
+        !self.is_blind() && self.winners().next().is_some()
+    }
+
     /// The cells with a rank, fastest first.
     pub fn sound(&self) -> impl Iterator<Item = &'r ReportCell> {
         let cells = self.cells.iter().copied();
@@ -239,9 +249,9 @@ impl Mean<'_> {
 }
 
 impl<'r> Overall<'r> {
-    /// The structures of `all`, of which those without ranks count nothing.
+    /// The structures of `all`; of several, those that decide nothing do not count.
     pub fn of(all: &[&Comparison<'r>]) -> Overall<'r> {
-        let ranked = || all.iter().filter(|c| c.winners().next().is_some());
+        let ranked = || all.iter().filter(|c| all.len() == 1 || c.decides());
         let cells = all.iter().flat_map(|comparison| &comparison.cells);
         let names: Vec<&'r str> = unique(cells.map(|cell| cell.structure.as_str()));
         let cells = |name: &str| -> Option<Vec<&'r ReportCell>> {

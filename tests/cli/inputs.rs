@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::process::*;
+use super::run_tables::prose;
 use super::{BOXES, EYE_LOOK, FULL_CAMERA};
 
 /// Corners of random boxes, z up.
@@ -414,6 +415,15 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             && !is_advised,
         "{done:?}"
     );
+    // Nor does it count beside others.
+    let both = "run --scene z.csv --path away.csv --path orbit:frames=4 --processes 3 --out both \
+        --structure linear,bvh";
+    let told = prose(&cullbench(folder.path(), both).out);
+    let counts = [
+        "; first or tied in 1",
+        " of 1. 1 row left out: no camera sees an item.",
+    ];
+    assert!(counts.iter().all(|wanted| told.contains(wanted)), "{told}");
 }
 
 #[test]
