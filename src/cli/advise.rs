@@ -7,7 +7,7 @@ use super::args::AdviseArgs;
 use super::document::{Block, Column, Table, show};
 use super::processes::{Job, Message, Timing};
 use super::run_table::{heads, structures};
-use super::run_verdict::{sharing, times};
+use super::run_verdict::{BLIND, sharing, times};
 use super::study::{Study, load, note_solid};
 use super::text::{self, significant, some, time_within};
 use super::{Ending, print};
@@ -118,13 +118,18 @@ pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<P
 fn blocks(advice: &Advice, args: &AdviseArgs, machine: &Machine) -> Vec<Block> {
     let all_columns = args.all_columns;
     let rows = &advice.structure.rows;
-    let lines = heads(&compared(rows)).into_iter();
+    let here = compared(rows);
+    let lines = heads(&here).into_iter();
     let lines = lines.chain([text::over(advice.processes, advice.twin.as_ref())]);
     let mut blocks: Vec<Block> = lines.map(Block::Line).collect();
     if all_columns {
         blocks.extend(evidence(advice));
     }
     blocks.push(Block::line(""));
+    if here.is_blind() {
+        blocks.push(Block::line(BLIND));
+        return blocks;
+    }
     let failed = rows.iter().filter_map(|row| {
         let (status, why) = (row.status.name(), row.reason.as_ref()?);
         Some(format!("{}: {status}: {why}", row.structure))

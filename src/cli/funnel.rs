@@ -16,6 +16,7 @@ use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
 use super::query::cell;
+use super::run_verdict::BLIND;
 use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{ROUNDS, Study, load, note_solid};
@@ -68,7 +69,15 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
         let reason = verdict.reason.as_deref().unwrap_or("no reason");
         bail!("a stage failed when it was timed: {reason}");
     }
-    let report = prepared.conclude(&times);
+    let mut report = prepared.conclude(&times);
+    let is_empty = |row: &StageRow| {
+        row.is_chosen
+            && row.back_end.stage == StageKind::Occlusion
+            && row.errors.output_count == 0.0
+    };
+    if report.stages[0].errors.truth_count == 0.0 && report.stages.iter().any(is_empty) {
+        report.conclusions = vec![BLIND.to_owned()];
+    }
     note_solid(&setting.scene, args.format);
     let table = || show(&funnel_table::blocks(&report, args.all));
     let shown = print(args.format, &report, table);

@@ -415,6 +415,17 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             && !is_advised,
         "{done:?}"
     );
+    for study in ["advise", "funnel --samples 32x18"] {
+        let line = format!("{study} --scene z.csv --path away.csv --structure bvh --processes 1");
+        let told = prose(&cullbench(folder.path(), &line).out);
+        let is_advised = ["Take ", "Use ", " is not needed"]
+            .iter()
+            .any(|s| told.contains(s));
+        assert!(
+            told.contains("Nothing is to be taken: no camera sees an item") && !is_advised,
+            "{told}"
+        );
+    }
     // Nor does it count beside others.
     let both = "run --scene z.csv --path away.csv --path orbit:frames=4 --processes 3 --out both \
         --structure linear,bvh";
