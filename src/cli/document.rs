@@ -1,6 +1,7 @@
 //! A document of headings, lines and tables, written as Markdown, as one HTML page
 //! or for a terminal, and the escaping of each; tables as rows and columns.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 
 use console::{Alignment, pad_str};
@@ -24,6 +25,12 @@ pub enum Block {
 impl Block {
     pub fn line(text: impl Into<String>) -> Block {
         Block::Line(text.into())
+    }
+
+    /// A line for each warning.
+    pub fn warnings(all: impl IntoIterator<Item = impl Display>) -> impl Iterator<Item = Block> {
+        let all = all.into_iter();
+        all.map(|said| Block::Line(format!("Warning: {said}")))
     }
 
     /// A heading of the second level.
@@ -137,7 +144,12 @@ pub fn show(blocks: &[Block]) -> io::Result<()> {
 
 /// The document as one page that needs no other file.
 pub fn to_html(title: &str, blocks: &[Block]) -> String {
-    let mut caption = title;
+    let body = format!("<main>\n{}</main>\n", elements(title, blocks));
+    page(title, "", &body, include_str!("assets/page.js"))
+}
+
+/// The blocks as HTML; `caption` is of tables above all headings.
+pub fn elements<'t>(mut caption: &'t str, blocks: &'t [Block]) -> String {
     let parts = blocks.iter().map(|block| match block {
         Block::Heading(level, text) => {
             caption = text;
@@ -149,8 +161,7 @@ pub fn to_html(title: &str, blocks: &[Block]) -> String {
         Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
         Block::Figure(figure) => format!("<figure>{}</figure>\n", figure.inline()),
     });
-    let body = format!("<main>\n{}</main>\n", parts.collect::<String>());
-    page(title, "", &body, include_str!("assets/page.js"))
+    parts.collect()
 }
 
 /// A page that needs no other file, in the style of all pages.

@@ -6,6 +6,7 @@ use super::document::{Block, Table, to_html};
 use super::figure::Figure;
 use super::run_resume::{command_line, typed_args};
 use super::{program, run_table, text};
+use crate::input::warnings;
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 
 /// A page of what a terminal shows: conclusions, figures, and the other blocks.
@@ -18,6 +19,7 @@ pub fn to_page(
     let title = format!("{} {about}", program::name());
     let mut all = vec![Block::Heading(1, title.clone())];
     all.extend(conclusions);
+    all.extend(Block::warnings(warnings()));
     all.extend(figures.into_iter().map(Block::Figure));
     // But for the title of a terminal.
     let is_title = |block: &Block| matches!(block, Block::Heading(1, _));

@@ -163,7 +163,7 @@ fn blocks(report: &Report, views: &BTreeMap<String, Views>) -> Vec<Block> {
     let warnings = report.input_warnings().into_iter();
     let warnings = warnings.chain(&report.noise.warnings);
     let warnings = warnings.chain(&report.run.left_out);
-    blocks.extend(warnings.map(|said| Block::Line(format!("Warning: {said}"))));
+    blocks.extend(Block::warnings(warnings));
     blocks.extend(details(report, &all, views));
     let every: Vec<&Comparison> = all.iter().collect();
     blocks.extend(run_table::choices(&every).into_iter().map(Block::Line));

@@ -16,7 +16,7 @@ use super::run_resume::typed_args;
 use super::shared_args::{SpreadArgs, StudyArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::index::Registry;
-use crate::input::{is_readable, tell_warnings};
+use crate::input::{is_readable, tell_warnings, warn};
 use crate::measure::{Machine, NO_ITEMS, ProcessTimes, Setting, Status};
 use crate::path;
 use crate::scene::{self, Scene, split_part};
@@ -96,7 +96,8 @@ pub fn note_solid(scene: &Scene, format: TableFormat) {
     let is_file = is_readable(Path::new(split_part(&scene.name).0));
     let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
     if format == TableFormat::Table && is_file && is_boxes {
-        tell!("warning: items count as solid boxes; the meshes in them may hide less");
+        warn("items count as solid boxes; the meshes in them may hide less");
+        tell_warnings();
     }
 }
 
@@ -158,12 +159,13 @@ impl Study {
         let times = text::counted(self.processes as usize, "process");
         let work = format!("{}{work}, timed in {times}", self.about);
         let line = format!("at work: {work}; the defaults take {by_default}");
+        let busy = Machine::capture().busy();
+        if let Some(busy) = busy.filter(|_| !self.bar.is_hidden()) {
+            warn(&format!("{busy}: times and advice may differ"));
+        }
         self.bar.suspend(tell_warnings);
         if !self.bar.is_hidden() {
-            let busy = Machine::capture().busy();
-            let busy = busy.map(|busy| format!("warning: {busy}: times and advice may differ"));
-            self.bar
-                .suspend(|| busy.iter().chain([&line]).for_each(|line| tell(line)));
+            self.bar.suspend(|| tell(&line));
         }
     }
 

@@ -10,7 +10,7 @@ use obvhs::ploc::morton::morton_encode_u64;
 use serde_json::{Value, json};
 
 use super::command_args::ViewArgs;
-use super::document::page;
+use super::document::{Block, elements, page};
 use super::query::{Row, ask_all, frustum};
 use super::study::progress;
 use super::text::{self, html};
@@ -20,7 +20,7 @@ use crate::culling::CameraView;
 use crate::funnel::{RaysEnd, Shape};
 use crate::geometry::Aabb;
 use crate::index::{Registry, TreeCell, verdicts};
-use crate::input::{note, tell_warnings};
+use crate::input::{note, tell_warnings, warnings};
 use crate::measure::{SceneInfo, Workload, input_of};
 use crate::oracle::Verdict;
 use crate::path::{self, CameraFacts};
@@ -156,11 +156,12 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let json = data.to_string().replace('<', "\\u003c");
     let title = format!("{} view {}", program::name(), scene.name);
     let body = format!(
-        "<main class=\"view\"><h1>{}, {}</h1>\n<p>{}</p>\n{}<p>{}</p>\n</main>\n\
+        "<main class=\"view\"><h1>{}, {}</h1>\n<p>{}</p>\n{}{}<p>{}</p>\n</main>\n\
          <script type=\"application/json\" id=\"data\">{json}</script>\n",
         html(&title),
         html(path),
         html(&told),
+        elements("", &Vec::from_iter(Block::warnings(warnings()))),
         include_str!("assets/view.html"),
         html(&about),
     );

@@ -10,7 +10,7 @@ mod table;
 
 pub use error::{InputError, Result, bare, gigabytes};
 pub use file::{held_files, hold_files, is_readable, names_file, pipes, read_file, stand_in};
-pub use note::{note, note_counted, tell_notes, tell_warnings, unheard, warn};
+pub use note::{note, note_counted, tell_notes, tell_warnings, unheard, warn, warnings};
 pub use table::{Row, TableReader};
 
 /// A finite f64, or what was expected.

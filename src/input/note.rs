@@ -46,6 +46,18 @@ pub fn tell_warnings() {
     });
 }
 
+/// All warnings so far, told or not.
+pub fn warnings() -> Vec<String> {
+    let mut all = Vec::new();
+    listening(|listener| {
+        let told = listener.iter().flat_map(|(_, lines, _)| lines);
+        all = told
+            .filter_map(|line| line.strip_prefix("warning: ").map(str::to_owned))
+            .collect();
+    });
+    all
+}
+
 /// Does something without its notes and warnings.
 pub fn unheard<T>(work: impl FnOnce() -> T) -> T {
     let mut kept = None;

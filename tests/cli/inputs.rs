@@ -426,6 +426,17 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             "{told}"
         );
     }
+    // What is told of the cameras is on the pages too.
+    for line in [
+        "funnel --scene z.csv --path away.csv --samples 32x18 --processes 1 --html page.html",
+        "precision --scene z.csv --path away.csv --cubes 0 --processes 1 --html page.html",
+        "view --scene z.csv --path away.csv --out page.html",
+    ] {
+        let done = cullbench(folder.path(), line);
+        let page = std::fs::read_to_string(folder.path().join("page.html")).expect("a page");
+        let told = "arning: away.csv: nothing of z.csv as loaded is visible in its view";
+        assert!(done.err.contains(told) && page.contains(told), "{done:?}");
+    }
     // Nor does it count beside others.
     let both = "run --scene z.csv --path away.csv --path orbit:frames=4 --processes 3 --out both \
         --structure linear,bvh";
