@@ -185,6 +185,10 @@ impl Study {
         plan: &impl Serialize,
     ) -> anyhow::Result<Vec<ProcessTimes>> {
         interrupt::from_now_on_finish();
+        // What came before is no measure of the parts.
+        if self.bar.position() == 0 {
+            self.bar.reset_elapsed();
+        }
         let plan = serde_json::to_value(plan)?;
         let mut all = Vec::new();
         let mut told = Instant::now();
@@ -205,5 +209,27 @@ impl Study {
             tell_progress(&self.bar, "steps", &mut told);
         }
         Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_told_by_counted_parts() {
+        let wait = Duration::from_millis(300);
+        for done in [0, 1] {
+            let spread = SpreadArgs {
+                processes: 0,
+                seed: 1,
+            };
+            let study = Study::new(String::new(), 1, &spread).unwrap();
+            let bar = study.bar.clone();
+            bar.inc(done);
+            std::thread::sleep(wait);
+            study.times("", None, &()).unwrap();
+            assert_eq!(bar.elapsed() < wait, done == 0, "{done}");
+        }
     }
 }
