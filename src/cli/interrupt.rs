@@ -15,7 +15,7 @@ pub fn from_now_on_finish() {
 
 /// Ends a command that has nothing to keep.
 #[derive(Debug, thiserror::Error)]
-#[error("interrupted: nothing was saved")]
+#[error("interrupted: nothing was saved; anything printed is incomplete")]
 pub struct Interrupted;
 
 /// Returns true after a request to stop.

@@ -56,7 +56,7 @@ fn signal(mut child: Child, signal: &str) -> Done {
 
 /// The answer to the first signal, where something is to be kept.
 const STOPPING: &str = "stopping at the next safe place; again ends at once\n";
-const NOTHING: &str = "interrupted: nothing was saved\n";
+const NOTHING: &str = "interrupted: nothing was saved; anything printed is incomplete\n";
 
 fn assert_stopped(done: &Done, what: &str) {
     assert_eq!(done.code, Some(130), "{what}");
@@ -125,6 +125,7 @@ fn ctrl_c_ends_commands_that_keep_nothing() {
     let before = contents(folder.path());
     let commands = [
         "query --scene uniform:n=2000000 --cameras orbit:frames=1000",
+        "query --scene uniform:n=20000 --cameras orbit:frames=1000 --structure linear --ids",
         "scene generate uniform:n=2000000",
         "scene generate uniform:n=2000000 --out kept.csv",
         "advise --scene uniform:n=3000 --processes 1000",
