@@ -143,9 +143,14 @@ impl<'a> Run<'a> {
             self.stream.finished_at = Some(at);
         }
         let report = self.stream.report();
+        let (name, folder) = (program::name(), self.folder.path.display().to_string());
+        let again = format!("{name} run --resume --out {}", text::quoted(&folder));
         if let Some(error) = failed {
             // A part of the cells makes no conclusion; what is on disk stays.
             let _ = save_report(&self.folder.path, &report);
+            if error.chain().any(|cause| cause.is::<io::Error>()) {
+                tell!("note: finished cells were saved; continue with {again}");
+            }
             return Err(error);
         }
         // Tables before files: where a file cannot be written, what was measured is seen.
@@ -163,8 +168,6 @@ impl<'a> Run<'a> {
         shown?;
         unread_is_fine(self.close(&report, save))?;
         if stopped {
-            let (name, folder) = (program::name(), self.folder.path.display().to_string());
-            let again = format!("{name} run --resume --out {}", text::quoted(&folder));
             tell!("interrupted: finished cells were saved; continue with {again}");
             return Ok(Ending::Interrupted);
         }
@@ -345,7 +348,7 @@ pub fn merge(args: &MergeArgs) -> Result<Ending> {
     interrupt::from_now_on_finish();
     let check = || interrupt::check().map_err(io::Error::other);
     match merged.write(&args.out, &check) {
-        Err(_) if interrupt::asked() => return Ok(Ending::Interrupted),
+        Err(_) if interrupt::asked() => return Err(Interrupted.into()),
         written => written?,
     }
     let report = merged.stream.report();

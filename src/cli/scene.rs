@@ -191,8 +191,8 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
             interrupt::from_now_on_finish();
             let written =
                 write_atomically(path, |out| write_boxes_csv(&scene, UntilInterrupted(out)));
-            if interrupt::asked() {
-                return Ok(Ending::Interrupted);
+            if written.is_err() {
+                interrupt::check()?;
             }
             written?;
             let items = text::counted(scene.items.len(), "item");

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use super::BOXES;
 use super::process::*;
 use super::runs::{cells, report};
+use super::{BOXES, PROGRAM};
 
 fn start(folder: &Path, line: &str) -> Child {
     let mut command = command(folder, line);
@@ -119,6 +119,26 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     );
 }
 
+/// As on a full disk, where a limit on the size of files is one of the system.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_cannot_be_written_says_how_it_goes_on() {
+    let folder = folder(&[]);
+    let line = "run --scene city:n=50 --path orbit:frames=2 --structure linear,bvh --no-bounds \
+        --processes 200 --out r";
+    let script = format!("trap '' XFSZ; ulimit -f 100; exec {PROGRAM} {line}");
+    let shell = Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(folder.path())
+        .output();
+    let err = String::from_utf8(shell.expect("a shell").stderr).expect("UTF-8");
+    let note = "note: finished cells were saved; continue with cullbench run --resume --out r\n";
+    let told = err
+        .split_once(note)
+        .map(|(_, rest)| rest.starts_with("error: r/"));
+    assert_eq!(told, Some(true), "{err}");
+}
+
 #[test]
 fn ctrl_c_ends_commands_that_keep_nothing() {
     let folder = folder(&[("kept.csv", b"kept")]);
@@ -202,7 +222,7 @@ fn a_signal_while_a_file_is_written_leaves_the_old_one() {
     };
     for kind in ["-INT", "-TERM", "-HUP"] {
         let done = signal(begun(), kind);
-        assert_eq!((done.code, &*done.err), (Some(130), STOPPING), "{kind}");
+        assert_stopped(&done, kind);
         assert!(contents(folder.path()) == before, "{kind}");
     }
     // A killed process cannot: the next one that writes there does.
