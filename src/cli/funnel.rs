@@ -221,8 +221,8 @@ fn passed(report: &FunnelReport) -> Figure {
         let (name, unit, at) = (stage.name(), row.unit, y + 12.0);
         parts += &format!("<text y=\"{at}\">{name}: {left} of {all} {unit}</text>\n");
         // The picture does not show triangles, and facing the eye is not being seen.
-        let [removed, seen] = [[0, 4], [1, 4], [2, 4], [0, 3], [3, 4]][stage as usize];
-        let colours = [removed, 3, seen].map(|class| FATE_CLASSES[class].colour);
+        let classes = [[0, 3, 4], [1, 3, 4], [2, 3, 4], [6, 7, 7], [3, 3, 4]][stage as usize];
+        let colours = classes.map(|class| FATE_CLASSES[class].colour);
         for (count, colour) in counts.into_iter().zip(colours) {
             let (y, width) = (y + LINE, axis.percent(count));
             parts += &format!(
@@ -231,7 +231,7 @@ fn passed(report: &FunnelReport) -> Figure {
         }
     }
     let (scene, path) = (&report.scene, &report.path);
-    let note = "logarithmic, in the colours of the picture";
+    let note = "logarithmic, in the colours of the key below the picture";
     Figure {
         caption: format!("{scene}, {path}: what each stage leaves per view; {note}"),
         margins: [4.0, 24.0],
@@ -256,14 +256,16 @@ fn page(report: &FunnelReport, scene: &Scene) -> String {
     to_page(&title, told.map(Block::line), [passed(report)], blocks)
 }
 
-/// Classes of items by the stage that removed them, then the others.
+/// Classes of items by the stage that removed them, the others, and those of triangles.
 const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
-    "#e4e4e4", "region: not reached through portals", false;
+    "#e4e4e4", "region: not seen from the eye's region", false;
     "#c0c8d0", "object: outside of the frustum", false;
     "#ecb566", "occlusion: behind others", false;
     "#56b4e9", "drawn, and not visible", true;
     "#009e73", "visible", true;
     "#d50000", "visible, and removed", true;
+    "#dcc8ea", "triangles that face away", false;
+    "#8a63b0", "triangles that face the eye", false;
 };
 
 /// The picture as SVG.
@@ -286,7 +288,7 @@ pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
         ]),
         scene,
         camera: view.camera.as_ref(),
-        classes: FATE_CLASSES,
+        classes: &FATE_CLASSES[..6],
         class_of: &class_of,
         cells: None,
     }

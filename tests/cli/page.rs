@@ -327,6 +327,20 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         let [figure, table] = ["<figure>", "<table>"].map(|tag| page.find(tag));
         assert!(figure.is_some() && figure < table, "{line}");
         assert!(page.contains(marks), "{line}");
+        // What a colour stands for is said once: triangles are no items.
+        for bar in between(&page, "<rect class=\"bar\"", "/>") {
+            let (_, colour) = bar.split_once("fill=").expect("a colour");
+            let key = format!("<i style=\"background:{}\"></i>", colour.trim_matches('"'));
+            assert_eq!(page.matches(&key).count(), 1, "{bar}");
+        }
+        let triangles = page.split_once(">triangle: ").map_or("", |found| found.1);
+        let triangles = triangles.split(">fragment: ").next().unwrap_or_default();
+        assert!(
+            !["#e4e4e4", "#56b4e9"]
+                .iter()
+                .any(|own| triangles.contains(own)),
+            "{triangles}"
+        );
         assert_eq!(unexplained(&page), set(""), "{line}");
         assert!(page.contains("svg.plot") && page.contains("aria-sort"));
     }
