@@ -35,7 +35,9 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let values = drawn.iter();
     let values = values.flat_map(|(_, found)| found.ends().unwrap_or([found.value; 2]));
     let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
-    axis.ticks = axis.powers(2.0);
+    // Within an octave there is but one.
+    let powers = Some(axis.powers(2.0)).filter(|powers| powers.len() > 1);
+    axis.ticks = powers.unwrap_or_default();
     let row = |(place, &&(cell, found)): (usize, &&(&ReportCell, Estimate))| {
         let (time, name, ratio) = (cell.time(), &cell.structure, found.value);
         let takes = text::some(time, |ns| text::time_within(ns.estimate()));
@@ -67,14 +69,13 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     Some(rows(caption, &axis, Some(1.0), &structures))
 }
 
-/// "4 x", "1/4 x".
+/// "4 x", "1/4 x", "0.8 x".
 fn ratio_name(ratio: f64) -> String {
-    match ratio < 1.0 && ratio > 1e-4 {
-        true => format!("1/{} x", (1.0 / ratio).round()),
-        false if (1.0..1e5).contains(&ratio) => {
-            format!("{} x", text::count(ratio.round() as usize))
-        }
-        false => times(ratio),
+    let is_whole = |ratio: f64| (1.0..1e5).contains(&ratio) && ratio.fract() == 0.0;
+    match ratio {
+        _ if is_whole(ratio) => format!("{} x", text::count(ratio as usize)),
+        _ if is_whole(1.0 / ratio) => format!("1/{} x", 1.0 / ratio),
+        _ => format!("{} x", text::short(ratio)),
     }
 }
 
@@ -300,8 +301,8 @@ mod tests {
 
     #[test]
     fn ratios_are_named_briefly() {
-        let names = [0.25, 1.0, 1024.0, 2f64.powi(40), 2f64.powi(-40)].map(ratio_name);
-        assert_eq!(names[..3], ["1/4 x", "1 x", "1,024 x"]);
+        let names = [0.25, 1.0, 1024.0, 1.2, 0.85, 2f64.powi(40), 2f64.powi(-40)].map(ratio_name);
+        assert_eq!(names[..5], ["1/4 x", "1 x", "1,024 x", "1.2 x", "0.85 x"]);
         assert!(names.iter().all(|name| name.len() < 22), "{names:?}");
     }
 

@@ -253,6 +253,23 @@ fn unexplained(page: &str) -> BTreeSet<&str> {
         .collect()
 }
 
+#[test]
+fn speed_ups_within_an_octave_have_a_scale() {
+    let folder = folder(&[]);
+    let run =
+        "run --scene city:n=50 --path orbit:frames=4 --structure linear --processes 1 --out r";
+    works(folder.path(), run);
+    let page = fs::read_to_string(folder.path().join("r/report.html")).expect("a page");
+    let (_, chart) = page.split_once("<svg class=\"plot\"").expect("a chart");
+    let chart = chart.split("</figure>").next().unwrap_or_default();
+    let names: Vec<&str> = between(chart, "class=\"tick\"", "</text>");
+    let named = |name: &str| names.iter().any(|tick| tick.ends_with(name));
+    assert!(
+        named(">0.9 x") && named(">1 x") && named(">1.1 x"),
+        "{names:?}"
+    );
+}
+
 /// The conclusion, then figures with marks, then tables.
 #[test]
 fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
