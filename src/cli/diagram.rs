@@ -1,6 +1,6 @@
 //! Diagrams: series of places over two axes, with their names beside the plot.
 
-use super::figure::{Axis, CHARACTER, Figure, LINE, Look, STRONG, class, line, mark};
+use super::figure::{Axis, CHARACTER, Figure, LINE, Look, class, line, mark};
 use super::text::{self, html, shortened};
 use crate::report::unique;
 
@@ -221,18 +221,15 @@ impl<'d> Diagram<'d> {
 
     /// Marks with names below the plot, for pictures; a page has its filter.
     fn legend(&self, classes: &[String], below: f64) -> (String, f64) {
-        let strong = self.series.iter().zip(classes);
-        let strong = strong.filter(|(_, class)| !class.ends_with("weak"));
         let mut parts = String::new();
-        for (n, (series, class)) in strong.enumerate() {
+        for (n, (series, class)) in self.series.iter().zip(classes).enumerate() {
             let (x, y) = (25.0 * (n % 4) as f64, below + LINE * (n / 4) as f64);
             let (mark, y) = (mark(series.look, "", [x, y], ""), y + 4.0);
             let text = html(&shortened(&series.name, NAME));
             let text = format!("<text x=\"{x}%\" dx=\"10\" y=\"{y:.1}\">{text}</text>");
             parts += &format!("<g class=\"s {class}\">{mark}{text}</g>\n");
         }
-        let lines = self.series.len().min(STRONG + 2).div_ceil(4);
-        (parts, LINE * lines as f64)
+        (parts, LINE * self.series.len().div_ceil(4) as f64)
     }
 }
 
@@ -317,8 +314,35 @@ pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Fig
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::picture;
+    use super::super::figure::{STRONG, picture};
     use super::*;
+
+    #[test]
+    fn every_structure_is_in_the_legend_with_a_mark_of_its_own() {
+        let registry = crate::index::Registry::builtin();
+        let names: Vec<&str> = registry.rows().iter().map(|row| row.info.name).collect();
+        let series = names
+            .iter()
+            .map(|name| Series::of(name, name.starts_with("linear"), vec![]));
+        let axis = || Axis::linear("", 0.0..1.0, &|value| value.to_string());
+        let axes = [axis(), axis()];
+        let diagram = Diagram::of(String::new(), axes, Joined::Apart, series.collect());
+        let (legend, height) = diagram.draw().legend;
+        assert_eq!(height, LINE * names.len().div_ceil(4) as f64);
+        let mut marks = std::collections::BTreeSet::new();
+        for (name, entry) in names.iter().zip(legend.lines()) {
+            assert!(
+                entry.contains(&format!(">{}</text>", shortened(name, NAME))),
+                "{entry}"
+            );
+            let colour = entry.split(['"', ' ']).nth(3);
+            let mark = entry
+                .split("<polygon class=")
+                .nth(1)
+                .and_then(|mark| mark.split('>').next());
+            assert!(mark.is_some() && marks.insert((colour, mark)), "{entry}");
+        }
+    }
 
     #[test]
     fn names_beside_a_plot_keep_a_line_between_them() {
@@ -344,7 +368,7 @@ mod tests {
         assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= LINE));
         let figure = diagram.draw();
         let page = figure.inline();
-        assert_eq!(page.matches("<g class=\"s c7 weak\"").count(), 25 - STRONG);
+        assert_eq!(page.matches(" weak\"").count(), 25 - STRONG);
         assert!(page.contains("&lt;c&gt;") && !page.contains("xmlns"));
         let picture = picture(&[figure], 1);
         assert!(picture.starts_with("<svg xmlns") && !picture.contains("var("));

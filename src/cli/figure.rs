@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::text::{self, html, shortened};
 use crate::statistics::Estimate;
 
-/// Series of a figure with a colour; the others are grey.
+/// Series of a figure in full colour; the others are weak.
 pub const STRONG: usize = 8;
 /// Least distance of two lines of text.
 pub const LINE: f64 = 16.0;
@@ -178,7 +178,7 @@ const SHAPES: [&str; 4] = [
     "0,-6 6,4 -6,4",
 ];
 
-/// Colour of scans and of what is not to stand out.
+/// Colour of scans.
 const GREY: usize = 7;
 
 /// Structures with a look of their own: name, colour, shape.
@@ -244,12 +244,12 @@ pub fn line(class: &str, [x1, x2]: [f64; 2], [y1, y2]: [f64; 2]) -> String {
     )
 }
 
-/// Colour of the series at a place in the order of importance; scans are grey.
+/// Class of the series at a place in the order of importance; scans are grey.
 pub fn class(look: Look, is_scan: bool, place: usize) -> String {
     match place < STRONG {
         _ if is_scan => "c7".to_owned(),
         true => format!("c{}", look.colour),
-        false => "c7 weak".to_owned(),
+        false => format!("c{} weak", look.colour),
     }
 }
 

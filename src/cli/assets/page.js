@@ -6,9 +6,7 @@
   const marks = new Map();
   for (const g of all("g[data-s]")) {
     const name = g.dataset.s;
-    // Grey in one chart, a structure may have its colour in another.
-    const is_better = !marks.has(name) || marks.get(name).matches(".weak");
-    if (is_better && g.querySelector(".mark")) marks.set(name, g);
+    if (!marks.has(name) && g.querySelector(".mark")) marks.set(name, g);
   }
   const tables = all("table");
   const off = new Set();
