@@ -96,7 +96,7 @@ fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
 /// Text of a line, with an escape before every mark of Markdown. A line break would
 /// end a table row.
 fn markdown(text: &str) -> String {
-    let marks = ['\\', '|', '`', '*', '_', '<', '[', '&'];
+    let marks = ['\\', '|', '`', '*', '_', '<', '[', '&', '~'];
     let text = text::plain(text);
     let escape = |c: char| marks.contains(&c).then_some('\\').into_iter().chain([c]);
     text.chars().flat_map(escape).collect()
@@ -378,7 +378,7 @@ mod tests {
 
     #[test]
     fn text_stays_text_in_every_format() {
-        let nasty = "a|b<script>\n`c` & \"d\"\u{202e}";
+        let nasty = "a|b<script>\n`c` & ~\"d\"\u{202e}";
         let mut table = Table::of_numbers(["x", nasty]);
         table.add_row([nasty, "1"]);
         let blocks = [
@@ -387,7 +387,7 @@ mod tests {
             Block::Picture("<svg></svg>".into()),
         ];
         let text = to_markdown(&blocks);
-        let plain = "a\\|b\\<script> \\`c\\` \\& \"d\"\\\\u{202e}";
+        let plain = "a\\|b\\<script> \\`c\\` \\& \\~\"d\"\\\\u{202e}";
         assert_eq!(
             text,
             format!("## {plain}\n\n| x | {plain} |\n|---|---:|\n| {plain} | 1 |\n")
@@ -397,7 +397,7 @@ mod tests {
             !page.contains("b<script>") && page.contains("<svg></svg>"),
             "{page}"
         );
-        let cell = "<th scope=\"row\">a|b&lt;script&gt; `c` &amp; &quot;d&quot;\\u{202e}</th><td \
+        let cell = "<th scope=\"row\">a|b&lt;script&gt; `c` &amp; ~&quot;d&quot;\\u{202e}</th><td \
                     class=\"n\">1</td>";
         assert!(page.contains(cell), "{page}");
     }

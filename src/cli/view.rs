@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::command_args::ViewArgs;
 use super::document::{Block, elements, page};
+use super::funnel_table::count;
 use super::query::{Row, ask_all, frustum};
 use super::study::progress;
 use super::text::{self, html};
@@ -210,7 +211,7 @@ fn fates(
 /// The result in words.
 fn conclusion(means: [f64; KINDS], samples: Option<&str>) -> String {
     let of = |fate: Fate| means[fate as usize];
-    let items = text::count(means.iter().sum::<f64>().round() as usize);
+    let items = text::counted(means.iter().sum::<f64>().round() as usize, "item");
     let told = |fate: Fate, none: &str, some: &str| match of(fate) {
         0.0 => none.to_owned(),
         mean => format!("{} {some}", text::significant(mean)),
@@ -223,8 +224,8 @@ fn conclusion(means: [f64; KINDS], samples: Option<&str>) -> String {
     });
     let lost = told(Fate::Lost, "no visible item lost", "visible items lost");
     // Those between culled and lost.
-    let returned = text::significant(means[1..4].iter().sum());
-    let returned = format!("{returned} of {items} items returned per view");
+    let returned = count(means[1..4].iter().sum());
+    let returned = format!("{returned} of {items} returned per view");
     text::joined([returned, extra, hidden, lost])
 }
 
@@ -415,6 +416,13 @@ mod tests {
     use super::*;
     use crate::camera::{Lens, MatrixConvention};
     use crate::scene::UpAxis;
+
+    #[test]
+    fn whole_means_are_counts() {
+        let told = |culled, visible| conclusion([culled, visible, 0.0, 0.0, 0.0], None);
+        assert!(told(0.0, 1.0).starts_with("1 of 1 item returned per view"));
+        assert!(told(1.5, 0.5).starts_with("0.500 of 2 items returned per view"));
+    }
 
     #[test]
     fn the_view_of_a_vulkan_matrix_is_upright() {

@@ -136,7 +136,7 @@
     const copy = el("button", "copy as Markdown", { type: "button", className: "copy" });
     copy.addEventListener("click", async () => {
       const seen = (cells) => [...cells].filter((cell) => !cell.classList.contains("off"));
-      const line = (cells) => "| " + cells.map((c) => c.textContent.replace(/[\\|`*_<[&]/g, "\\$&")).join(" | ") + " |";
+      const line = (cells) => "| " + cells.map((c) => c.textContent.replace(/[\\|`*_<[&~]/g, "\\$&")).join(" | ") + " |";
       const head = seen(table.tHead.rows[0].cells);
       const rule = "|" + head.map((th) => (th.className === "n" ? "---:|" : "---|")).join("");
       const rows = [...table.tBodies[0].rows].filter((row) => !row.classList.contains("off"));
