@@ -21,9 +21,7 @@ use super::study::{progress, tell_progress};
 use super::{Ending, compare, expect_folder, program, run_why, text, unread_is_fine};
 use crate::index::Registry;
 use crate::input;
-use crate::measure::{
-    GroupKey, Machine, Part, PathInfo, Plan, SceneInfo, Share, SubjectPart, Verdict,
-};
+use crate::measure::{GroupKey, Machine, Part, Plan, Share, Verdict};
 use crate::path::DEFAULT_PATH;
 use crate::report::{
     Line, Report, RunFolder, Stream, comparisons, merge as join, read_stream, save_report, utc,
@@ -254,18 +252,14 @@ impl<'a> Run<'a> {
         for (key, process) in missed {
             let before = self.stream.of_group(key);
             let before = before.first().map(|kept| &kept.part);
-            let structures = self.plan.structures.iter();
-            let subjects = structures.map(|spec| SubjectPart::unknown(spec, verdict.clone()));
-            let unknown = || SceneInfo::unknown(&key.scene);
-            let part = Part {
-                key: key.clone(),
+            let mut part = Part {
                 process,
-                scene: before.map_or_else(unknown, |part| part.scene.clone()),
-                path: before.map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
-                subjects: subjects.collect(),
                 failed: failed.clone(),
-                ..Part::default()
+                ..Part::of_failed(key, &self.plan.structures, verdict)
             };
+            if let Some(before) = before {
+                (part.scene, part.path) = (before.scene.clone(), before.path.clone());
+            }
             self.stream.parts.push(self.folder.keep(part, &[])?);
             self.bar.inc(1);
         }

@@ -11,7 +11,7 @@ use super::shared_args::{WhatArgs, each_once};
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
-use crate::measure::{GroupKey, Part, Plan, PlannedScene, Workload};
+use crate::measure::{GroupKey, Part, Plan, PlannedScene};
 use crate::motion::Motion;
 use crate::path::{self, DEFAULT_PATH, LensDefaults};
 use crate::report::{KeptPart, Stream};
@@ -175,7 +175,8 @@ impl RunPlan {
                         let motion = motion.map(|motion| Motion::load(motion, &scene));
                         let (motion, views) = (motion.transpose()?, self.plan.views_per_frame);
                         let motion = motion.inspect(|own| own.tell_numbers(&path, views));
-                        let workload = Workload::moving(&scene, &path, culling, motion, views)?;
+                        let workload = self.plan.workload(&scene, &path, culling, motion)?;
+                        let Ok(workload) = workload else { continue };
                         let moved = workload.motion.as_ref().map_or("", |own| &own.name);
                         let (what, name) = match moved {
                             "" => ("path", source.as_str()),

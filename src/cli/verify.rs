@@ -68,7 +68,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     interrupt::from_now_on_finish();
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
-    let (mut checks, mut skipped_items) = (Vec::new(), 0);
+    let (mut checks, mut left_out, mut skipped_items) = (Vec::new(), Vec::new(), 0);
     // The command that checks a scene and path alone has the other options as typed.
     let own = ["scene", "path", "cases", "seed", "format"];
     let typed = TypedOptions::of("verify", "verify", std::env::args_os())?;
@@ -86,7 +86,8 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             let cameras = path::load(&path, &scene, &defaults)?;
             let words = ["verify", "--scene", source, "--path", &path].map(str::to_owned);
             let again = command_line(&[&words[..], &others].concat());
-            checks.extend(check_path(&scene, &cameras, &culling, &subjects, &again)?);
+            let rows = check_path(&scene, &cameras, &culling, &subjects, &again, &mut left_out);
+            checks.extend(rows?);
         }
         bar.inc(1);
     }
@@ -105,6 +106,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         seconds: started.elapsed().as_secs_f64(),
         seed,
         cases,
+        left_out,
         checks,
     };
     print(args.format, &outcome, || show(&outcome))?;
@@ -119,9 +121,10 @@ fn check_path(
     culling: &Culling,
     [over_boxes, over_spheres]: &[Vec<Subject>; 2],
     again: &str,
+    left_out: &mut Vec<String>,
 ) -> anyhow::Result<Vec<Check>> {
     let mut rows: Vec<Check> = Vec::new();
-    let workloads = workloads(scene, cameras, culling)?.into_iter();
+    let workloads = workloads(scene, cameras, culling, left_out)?.into_iter();
     for (kind, workload) in workloads.take_while(|_| !interrupt::asked()) {
         let subjects = match workload.culling.test {
             CullingTest::Sphere => over_spheres,
@@ -159,6 +162,7 @@ fn workloads<'a>(
     scene: &'a Scene,
     cameras: &CameraPath,
     culling: &Culling,
+    left_out: &mut Vec<String>,
 ) -> anyhow::Result<Vec<(String, Workload<'a>)>> {
     let around = scene.surroundings();
     let first = format!("{} perspective", culling.arithmetic.name());
@@ -170,7 +174,8 @@ fn workloads<'a>(
         all.push(((*kind).to_owned(), workload));
     }
     for (i, camera) in cameras.cameras.iter().enumerate() {
-        let volumes = variants(camera, &culling.planes, &around, i)?;
+        // Where f32 holds no six planes, which is told below, there are none.
+        let volumes = variants(camera, &culling.planes, &around, i).unwrap_or_default();
         for (kind, volume) in volumes.into_iter().skip(1) {
             let of_kind = all.iter_mut().find(|(name, _)| name == kind);
             let (_, workload) = of_kind.expect("one of each kind");
@@ -178,10 +183,14 @@ fn workloads<'a>(
         }
     }
     for other in Culling::all(culling.planes).filter(|other| other != culling) {
-        let mut workload = Workload::new(scene, cameras, &other)?;
-        workload.points.clear();
         let kind = format!("{} {}", other.test.name(), other.arithmetic.name());
-        all.push((kind, workload));
+        match Workload::new(scene, cameras, &other) {
+            Ok(mut workload) => {
+                workload.points.clear();
+                all.push((kind, workload));
+            }
+            Err(error) => left_out.push(format!("{}: {kind} left out: {error}", scene.name)),
+        }
     }
     Ok(all)
 }
@@ -371,6 +380,8 @@ struct Outcome {
     seconds: f64,
     seed: u64,
     cases: u64,
+    /// Culling tests that have no view of a camera, each with the reason.
+    left_out: Vec<String>,
     checks: Vec<Check>,
 }
 
@@ -438,6 +449,8 @@ fn show(outcome: &Outcome) -> io::Result<()> {
         }
     );
     told.push(text::wrapped(&checked, width));
+    let left_out = outcome.left_out.iter();
+    told.extend(left_out.map(|line| text::wrapped(&text::plain(line), width)));
     if !outcome.against_cameras {
         let doubt = "Planes without the full margin may drop visible items: a few cameras were \
                      checked, points on their faces were not.";

@@ -12,7 +12,9 @@ use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
 use super::process_result::{Known, Part, TaskSamples};
 use super::schedule::cameras_within;
-use super::{Machine, Notice, Protocol, SceneInfo, Subject, Verdict, Workload, WorkloadError};
+use super::{
+    Machine, Notice, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
+};
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
 use crate::input::InputError;
@@ -154,6 +156,31 @@ impl Plan {
             })
         };
         self.groups().into_iter().flat_map(cells_of).collect()
+    }
+
+    /// The queries of a path by a culling test; a refusal where another test has views.
+    ///
+    /// # Errors
+    /// No culling test of the plan has a view of every camera.
+    pub fn workload<'s>(
+        &self,
+        scene: &'s Scene,
+        path: &CameraPath,
+        culling: &Culling,
+        motion: Option<Motion>,
+    ) -> Result<Result<Workload<'s>, Verdict>, WorkloadError> {
+        let views = self.views_per_frame;
+        let name = motion.as_ref().map(|motion| motion.name.clone());
+        let has_views = |other: &Culling| {
+            let motion = name.iter().find_map(|name| Motion::load(name, scene).ok());
+            Workload::moving(scene, path, other, motion, views).is_ok()
+        };
+        match Workload::moving(scene, path, culling, motion, views) {
+            Err(error) if self.cullings.iter().any(has_views) => {
+                Ok(Err(Verdict::new(Status::Refused, error.to_string())))
+            }
+            made => made.map(Ok),
+        }
     }
 
     fn has_all(&self) -> bool {
@@ -316,8 +343,18 @@ pub fn measure_loaded(
         let path = path_of(&key.path, scale)?;
         let motion = Some(&key.motion).filter(|motion| !motion.is_empty());
         let motion = motion.map(|motion| Motion::load(motion, scene));
-        let (motion, views) = (motion.transpose()?, plan.views_per_frame);
-        let workload = Workload::moving(scene, &path, &culling, motion, views)?;
+        let workload = plan.workload(scene, &path, &culling, motion.transpose()?)?;
+        let workload = match workload {
+            Ok(workload) => workload,
+            Err(verdict) => {
+                let mut part = Part::of_failed(&key, &plan.structures, &verdict);
+                part.path.camera_count = path.cameras.len();
+                (part.process, part.scene) = (share.process, info.clone());
+                part.failed.clone_from(&share.failed);
+                keep(part, Vec::new());
+                continue;
+            }
+        };
         let protocol = Protocol {
             rounds: plan.effort.rounds,
             task_ns: plan.effort.task_ns,

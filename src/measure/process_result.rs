@@ -117,6 +117,21 @@ pub struct Known {
     pub lens_scale: Option<f64>,
 }
 
+impl Part {
+    /// A part whose structures all have this verdict, of what is not known otherwise.
+    pub fn of_failed(key: &GroupKey, structures: &[StructureSpec], verdict: &Verdict) -> Part {
+        let subjects = structures.iter();
+        let subjects = subjects.map(|spec| SubjectPart::unknown(spec, verdict.clone()));
+        Part {
+            key: key.clone(),
+            scene: SceneInfo::unknown(&key.scene),
+            path: PathInfo::unknown(key),
+            subjects: subjects.collect(),
+            ..Part::default()
+        }
+    }
+}
+
 impl Known {
     /// Schedule of a pass, if it is timed, and the right answers.
     pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule>, &[Answer]) {

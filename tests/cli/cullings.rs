@@ -248,6 +248,55 @@ fn verify_asks_every_kind_of_volume_test_and_arithmetic() {
     }
 }
 
+/// Spheres reach farther than boxes: here their sums overflow f32, and no others do.
+#[test]
+fn a_test_that_f32_does_not_hold_leaves_the_others() {
+    let scene =
+        format!("{BOXES}\n-3e37,-3e37,-3e37,-2e37,-2e37,-2e37\n2e37,2e37,2e37,3e37,3e37,3e37\n");
+    let cameras = format!("{FULL_CAMERA}\n0,0,0,1,2,0.3,0,0,1,60,1.5,1e34,1e38\n");
+    let here = folder(&[("s.csv", scene.as_bytes()), ("c.csv", cameras.as_bytes())]);
+    let what = "--scene s.csv --path c.csv --structure linear,wide";
+    let verify = format!("verify {what} --format json");
+    let told = json(&works(here.path(), &verify));
+    assert_eq!(told["ok"], true, "{told}");
+    let left_out = told["left_out"].as_array().expect("a list");
+    let [line] = &left_out[..] else {
+        panic!("{told}");
+    };
+    let wanted = "s.csv: sphere f32 left out: c.csv, line 2: sums of the plane test reach";
+    assert!(
+        line.as_str().is_some_and(|line| line.starts_with(wanted)),
+        "{line}"
+    );
+    let run = format!("run {what} --processes 2");
+    works(
+        here.path(),
+        &format!("{run} --test sphere,six-plane --out run"),
+    );
+    let report = report(&here.path().join("run"));
+    for cell in cells(&report) {
+        let is_refused = cell["test"] == "sphere";
+        assert_eq!(
+            cell["status"],
+            ["ok", "refused"][usize::from(is_refused)],
+            "{cell}"
+        );
+        let reason = cell["reason"].as_str().unwrap_or_default();
+        assert_eq!(
+            reason.starts_with("c.csv, line 2: sums"),
+            is_refused,
+            "{cell}"
+        );
+    }
+    // Where nothing is left.
+    let alone = cullbench(here.path(), &format!("{run} --test sphere --out alone"));
+    assert_refused(
+        &alone,
+        "c.csv, line 2: sums of the plane test | expected",
+        "alone",
+    );
+}
+
 /// With the epsilon nothing is lost that touches the view; without it much of
 /// this scene is, so that planes that lack it would not pass for safe.
 #[test]

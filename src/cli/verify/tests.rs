@@ -103,7 +103,15 @@ fn a_structure_that_refused_to_build_is_not_called_right() {
         let build = |spec: &StructureSpec| Subject::build(spec.clone(), false, &scene, test);
         [&linear, &refused].map(build).into_iter().collect()
     });
-    let rows = check_path(&scene, &cameras, &Culling::default(), &subjects, "again").expect("rows");
+    let rows = check_path(
+        &scene,
+        &cameras,
+        &Culling::default(),
+        &subjects,
+        "again",
+        &mut Vec::new(),
+    )
+    .expect("rows");
     assert!(rows[0].status == Status::Ok && rows[0].verdicts > 0);
     assert!(rows[1].status == Status::Refused && rows[1].verdicts == 0);
     assert!(rows[1].difference.is_none());
