@@ -64,17 +64,29 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     // Sets of a coarse test are larger than what is visible.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
     let culled = comparison.of_any("cull_rate");
+    // All may be false positives: there is no share of the visible ones.
+    let judged = comparison.judged();
+    let none = judged.filter(|j| j.errors.visible == 0 && j.errors.false_positives > 0);
     let visible = culled.map(|culled| {
         let share = 1.0 - culled;
         let returned = text::short_percent(share);
-        let seen = excess.map(|excess| text::short_percent(share / (1.0 + excess)));
-        match seen {
-            None => format!("{returned} of the items are visible"),
-            Some(seen) => format!("{returned} of the items are returned, about {seen} visible"),
-        }
+        let seen = match (excess, none) {
+            (Some(excess), _) => {
+                format!(
+                    "about {} visible",
+                    text::short_percent(share / (1.0 + excess))
+                )
+            }
+            (_, Some(judged)) => {
+                let views = text::counted(judged.judged_queries, "checked view");
+                format!("none visible in {views}")
+            }
+            _ => return format!("{returned} of the items are visible"),
+        };
+        format!("{returned} of the items are returned, {seen}")
     });
     // Nothing if all are the culling test's own.
-    let errors = comparison.judged().map(|judged| judged.errors);
+    let errors = judged.map(|judged| judged.errors);
     let errors = errors.filter(|errors| errors.by_storage > 0 || errors.by_planes > 0);
     let sources = errors.map(|errors| text::sources(errors) + " by storage/planes/test");
     let excess = comparison.metric_of_any("excess");

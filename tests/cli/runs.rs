@@ -7,9 +7,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::BOXES;
 use super::process::*;
 use super::run_tables::prose;
+use super::{BOXES, FULL_CAMERA};
 
 pub fn report(run: &Path) -> Value {
     json(&fs::read_to_string(run.join("report.json")).expect("a report"))
@@ -301,6 +301,25 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
     assert!(compared.contains(", 1 cell\n"), "{compared}");
     let verdict = "0 slower, 1 inconclusive, 0 faster, 0 same of 1 cell\n";
     assert!(compared.ends_with(verdict), "{compared}");
+}
+
+/// The box beside the corner of the view is behind none of its planes.
+#[test]
+fn returned_items_that_are_all_false_positives_are_not_called_visible() {
+    let boxes = format!("{BOXES}\n9.2,-9.4,0,12,-8.6,1\n500,500,0,501,501,1\n");
+    let camera = format!("{FULL_CAMERA}\n0,0,0,0,-1,0,0,0,1,90,1,1,9\n");
+    let folder = folder(&[("b.csv", boxes.as_bytes()), ("c.csv", camera.as_bytes())]);
+    let what = "--scene b.csv --path c.csv --structure linear,wide --processes 1";
+    let wanted = "50 % of the items are returned, none visible in 1 checked view\n";
+    for command in ["run", "advise", "report"] {
+        let line = match command {
+            "run" => format!("run {what} --out one"),
+            "report" => "report one".to_owned(),
+            _ => format!("{command} {what}"),
+        };
+        let told = works(folder.path(), &line);
+        assert!(told.contains(wanted), "{command}: {told}");
+    }
 }
 
 /// Beside the camera, where f32 has steps of 8 km: stored they are seen, written
