@@ -199,27 +199,24 @@ fn workloads<'a>(
 /// the oracle, for some of the cameras; points on their faces where the planes are safe.
 pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
-    let or_points = match workload.culling.unproven().is_none() {
+    let (missed, or_points) = match workload.culling.unproven().is_none() {
         true => {
             errors += on_the_faces(workload);
-            " (or points on the faces)"
+            (errors.dropped(), " (or points on the faces)")
         }
         // Contacts are not promised.
-        false => {
-            errors.touch_dropped = 0;
-            ""
-        }
+        false => (errors.false_negatives, ""),
     };
-    if errors.dropped() == 0 {
+    if missed == 0 {
         return;
     }
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
         check.status = Status::Unsafe;
         check.difference = Some(format!(
-            "camera level: missed {}{or_points} and {}, the deepest by {:e}\n  again: {again}",
+            "camera level: missed {}{or_points} and {}, the deepest by {}\n  again: {again}",
             text::counted(errors.false_negatives as usize, "visible item"),
             text::counted(errors.touch_dropped as usize, "boundary contact"),
-            errors.worst_miss
+            text::significant(errors.worst_miss)
         ));
     }
 }

@@ -15,6 +15,7 @@ use crate::index::Kind;
 use crate::path::evenly;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::scene::mix64;
+use crate::shown::significant;
 use crate::statistics::{Estimate, rate_of};
 use crate::verify::{
     ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility, scan,
@@ -218,8 +219,10 @@ impl Judged {
         let errors = &self.errors;
         (errors.false_negatives > 0).then(|| {
             let reason = format!(
-                "{} of {} visible items are missed at camera level, the deepest by {:e}",
-                errors.false_negatives, errors.visible, errors.worst_miss
+                "{} of {} visible items are missed at camera level, the deepest by {}",
+                errors.false_negatives,
+                errors.visible,
+                significant(errors.worst_miss)
             );
             Verdict::new(Status::Unsafe, reason)
         })

@@ -226,6 +226,9 @@ fn answers_that_are_wrong_at_camera_level_are_unsafe() {
             reason.starts_with(&missed.unwrap_or(0).to_string()),
             "{cell}"
         );
+        // Three digits, no 16.
+        let deepest = reason.rsplit(' ').next().unwrap_or_default();
+        assert!(deepest.len() < 7 && !deepest.contains('e'), "{reason}");
         // What is unsafe is not ranked.
         assert!(cell["metrics"]["query_ns"].is_null(), "{cell}");
     }
@@ -318,6 +321,21 @@ fn verify_holds_the_default_planes_to_the_camera() {
     }
     assert_eq!(count(""), 4 * 399, "every box touches the view or is in it");
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
+}
+
+/// Not promised without the margin, contacts are still counted beside what is missed.
+#[test]
+fn verify_counts_the_contacts_that_planes_without_a_margin_drop() {
+    let scene = format!("{BOXES}\n2,4,3,3,6,3.5\n30,2,3,30.5,3,4\n");
+    let camera = format!("{FULL_CAMERA}\n1,2,3,2,2,3,0,0,1,90,1,3.1e-6,30\n");
+    let here = folder(&[("s.csv", scene.as_bytes()), ("c.csv", camera.as_bytes())]);
+    let line = "verify --scene s.csv --path c.csv --planes gh-gl-f32 --epsilon 0";
+    let told = cullbench(here.path(), line);
+    let wanted = "missed 1 visible item and 1 boundary contact, the deepest by 1.00\n";
+    assert!(
+        told.code == Some(1) && told.out.contains(wanted),
+        "{told:?}"
+    );
 }
 
 /// Orthographic and perspective cameras in one file, read by every command.
