@@ -295,7 +295,7 @@ pub fn default_lens(defaults: &LensDefaults) -> String {
     })
 }
 
-/// "column-gl, depth -1 to 1; the first: eye (..), right (..), .."
+/// "column-gl; the first: depth -1 to 1, eye (..), right (..), .."
 pub fn matrices(facts: &MatrixFacts) -> String {
     let vectors = [facts.eye, facts.right, facts.up, facts.forward];
     let [eye, right, up, forward] = vectors.map(|v| format!("({})", v.map(figure).join(", ")));
@@ -306,8 +306,8 @@ pub fn matrices(facts: &MatrixFacts) -> String {
         false => ["", "eye"],
     };
     format!(
-        "{convention}, depth {near} to {far}{by_name}{mirrored}; the first: {at} {eye}, right \
-         {right}, up {up}, forward {forward}"
+        "{convention}; the first: depth {near} to {far}{by_name}{mirrored}, {at} {eye}, right {right}, \
+         up {up}, forward {forward}"
     )
 }
 

@@ -236,7 +236,7 @@ fn a_run_says_axes_and_lens_as_used() {
 fn matrices_are_said_taken_apart() {
     let folder = both_axes();
     std::fs::write(folder.path().join("m.csv"), format!("{MATRIX}\n{GL}\n")).expect("writable");
-    let taken = "column-gl, depth -1 to 1; the first: eye (2, 3, 1), right (1, 0, 0), up (0, 0, \
+    let taken = "column-gl; the first: depth -1 to 1, eye (2, 3, 1), right (1, 0, 0), up (0, 0, \
                  1), forward (0, 1, 0)";
     let cameras = "--path m.csv --matrix-convention column-gl";
     let run = format!("run --scene z.csv {cameras} --structure linear,bvh --processes 2 --out run");
