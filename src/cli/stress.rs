@@ -1,8 +1,8 @@
 //! `cullbench stress`: the test vectors and the generated extremes on every
-//! structure. Prints what passed in a line per category and everything that
-//! failed in full, or all rows as JSON.
+//! structure. Prints what passed in a line per category and each kind of failure
+//! with who fails so, or all rows as JSON.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::time::Instant;
 
@@ -118,6 +118,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(is_right))
 }
 
+/// Failures that the table shows, each with all that fail alike.
+const MOST_SHOWN: usize = 100;
+
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;
 
@@ -150,12 +153,31 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let width = text::width();
     let mut told = vec![Table::with(sections, columns).fitted(width)];
     let rows = || sections.iter().flat_map(|section| &section.rows);
+    // Alike but for structure, test and instruction set.
+    let (mut places, mut alike) = (BTreeMap::new(), Vec::<(&Row, Vec<String>)>::new());
     for row in rows().filter(|row| row.status == Status::Fail) {
-        let (id, level) = (text::plain(&row.id), row.level.name());
         let by = text::some(row.kernel, |kernel| format!(" by {kernel}"));
-        let (structure, test) = (&row.structure, &row.test);
-        told.push(format!("{id}, {level} level, {structure}, {test}{by}:"));
+        let key = (&row.id, row.level.name(), &row.expected, &row.got);
+        let place = *places.entry(key).or_insert(alike.len());
+        if place == alike.len() {
+            alike.push((row, Vec::new()));
+        }
+        alike[place]
+            .1
+            .push(format!("{} {}{by}", row.structure, row.test));
+    }
+    for (row, who) in alike.iter().take(MOST_SHOWN) {
+        let (id, level, who) = (
+            text::plain(&row.id),
+            row.level.name(),
+            text::first_of(who, 3),
+        );
+        told.push(format!("{id}, {level} level, {who}:"));
         told.push(format!("  expected {}\n  got {}", row.expected, row.got));
+    }
+    if alike.len() > MOST_SHOWN {
+        let more = text::counted(alike.len() - MOST_SHOWN, "further failure");
+        told.push(format!("{more}: --format json"));
     }
     let mut tally = Tally::default();
     sections.iter().for_each(|section| tally += section.tally);

@@ -45,7 +45,7 @@ impl Status {
 }
 
 /// Names of boxes, or words.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Said {
     /// A set of boxes.

@@ -41,6 +41,8 @@ pub struct Vector {
     pub id: Name,
     category: Option<Name>,
     plane_method: Option<Value>,
+    normals: Option<Value>,
+    semantics: Option<Value>,
     planes: Option<Vec<Array<Narrow, 4>>>,
     /// Replaces `planes` where a file has both: the answers are about these bits.
     planes_f32_hex: Option<Vec<Array<Bits, 4>>>,
@@ -190,7 +192,13 @@ impl Vector {
         let is_refused = self.camera_error().is_some();
         let method = self.plane_method.as_ref().and_then(Value::as_str);
         let is_other = method.is_some_and(|own| !METHODS.split(' ').any(|known| known == own));
+        let is_not = |own: &Option<Value>, wanted: &str| {
+            let text = own.as_ref().and_then(Value::as_str);
+            text.is_some_and(|own| !own.starts_with(wanted))
+        };
         let found = [
+            is_not(&self.normals, "inward").then_some("normals that are not inward"),
+            is_not(&self.semantics, "closed").then_some("semantics that are not closed"),
             is_other.then_some("a plane_method that is none of the format"),
             (no_camera && (seen || is_refused)).then_some("claims about a camera but no camera"),
             (seen && is_refused).then_some("boxes seen by a camera that must be refused"),
@@ -336,6 +344,9 @@ fn note_unknown(bytes: &[u8], file: &str, vectors: usize) {
         let guess = match nearest(name, own.map(|[_, field]| field.as_str())) {
             Some(guess) => format!(" (did you mean '{guess}'?)"),
             None if holder == "camera" => String::new(),
+            None if ["normals", "semantics"].contains(&name.as_str()) => {
+                ": inward normals and closed bounds, n.p + d >= 0, are meant".to_owned()
+            }
             None => continue,
         };
         let found = format!("field '{}' of '{holder}' is not read", plain(name));

@@ -143,7 +143,9 @@ fn failures_are_counted_once() {
     let made = number_before(" checks in") + more.unwrap_or(0);
     let kernels = [1, 2, 3].map(|kernels| kernels * one);
     assert!(kernels.contains(&made), "{made} of {one}: {table}");
-    assert!(table.contains("dropped, 6e0 away"), "{table}");
+    // One failure of all tests and instruction sets.
+    let alike = table.matches("got dropped, 6e0 away").count();
+    assert_eq!(alike, 1, "{table}");
 }
 
 #[test]

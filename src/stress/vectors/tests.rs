@@ -165,6 +165,18 @@ fn claims_and_fields_that_are_not_judged_are_told() {
             "vectors[0]: a plane_method that is none of the format; not judged",
         ),
         (r#""plane_method":"gh_gl_f32""#, ""),
+        (
+            r#""normals":"outward""#,
+            "vectors[0]: normals that are not inward; not judged",
+        ),
+        (
+            r#""semantics":"open: inside iff n.p+d > 0""#,
+            "vectors[0]: semantics that are not closed; not judged",
+        ),
+        (
+            r#""normals":"inward","semantics":"closed: box [lo,hi]""#,
+            "",
+        ),
         // A list without names claims nothing.
         (
             r#""expected_visible_camera":[],"touch_camera":null,"touch_planes":[]"#,
