@@ -65,11 +65,13 @@ pub enum CameraError {
         expected: &'static str,
     },
     /// A plane that f32 cannot store.
-    #[error("the view volume does not fit f32: {0}; expected planes within its range")]
+    #[error(
+        "the view volume does not fit f32: {0}; expected planes within its range; f64 arithmetic has a larger one"
+    )]
     Volume(#[from] VolumeError),
     /// A sum of the plane test that could overflow f32.
     #[error(
-        "sums of the plane test reach {largest:e} in scene coordinates; expected at most 1.7e38, half of what f32 holds"
+        "sums of the plane test reach {largest:e} in scene coordinates; expected at most 1.7e38, half of what f32 holds; f64 arithmetic, if the test has it, has no such limit"
     )]
     Sums {
         /// Upper bound of the sums.

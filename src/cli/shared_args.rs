@@ -287,7 +287,7 @@ pub struct LensArgs {
     /// Vertical field of view in degrees for cameras without one [default: 60]
     #[arg(long, value_name = "DEG", value_parser = values::field_of_view)]
     pub fovy: Option<f64>,
-    /// Width / height for cameras without one [default: 16:9, 1.778]
+    /// Width / height for cameras without one [default: 1.778, 16 by 9]
     #[arg(long, value_parser = values::above_zero)]
     pub aspect: Option<f64>,
     /// Near plane for cameras without one [default: far / 1000, 0.1 for street; at

@@ -70,9 +70,9 @@ pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
 
 /// All generated meshes, in the order of the help.
 pub static MESHES: &[Family] = rows! { Family { name, summary, params, build }
-    "mesh:terrain", "A heightfield in tiles of 512 triangles; one-sided, open",
+    "mesh:terrain", "a heightfield in tiles of 512 triangles; one-sided, open",
         "", Mesh(ground::terrain);
-    "mesh:forest", "Terrain with trees (closed) and bushes of cut-out leaf cards",
+    "mesh:forest", "terrain with trees (closed) and bushes of cut-out leaf cards",
         "", Mesh(ground::forest);
     "mesh:spheres", "Geodesic spheres of 1,280 triangles each; closed",
         "", Mesh(spheres::spheres);
