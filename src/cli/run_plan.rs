@@ -67,7 +67,8 @@ pub fn plan_of(
     cullings.iter().try_for_each(Culling::check)?;
     each_once("test", tests())?;
     let list = args.moves.list(&names);
-    let structures = args.culling.kernel.structures(registry, list)?;
+    let structures = args.culling.kernel.structures(registry, list);
+    let structures = of_suite(args.structure.is_empty().then_some(&suite.name), structures)?;
     let (scenes, left_out) = scenes(args, &suite)?;
     let mut plan = Plan {
         scenes,
@@ -102,6 +103,15 @@ pub fn plan_of(
     })
 }
 
+/// Errors in the file of a suite name it.
+fn of_suite<T>(suite: Option<&String>, found: Result<T>) -> Result<T> {
+    let file = suite.filter(|suite| suite.ends_with(".toml"));
+    match file {
+        Some(file) => found.context(file.clone()),
+        None => found,
+    }
+}
+
 /// "2/4": the second of four shares.
 fn shard(text: &str) -> Result<(usize, usize)> {
     let numbers = text.split_once('/');
@@ -122,17 +132,13 @@ impl RunPlan {
             let file = Path::new(split_part(source).0);
             if names_file(source) && !is_readable(file) {
                 let found = fs::metadata(file).map_err(InputError::io(file, "file"));
-                let suite = self.suite.as_ref();
-                match suite.filter(|suite| suite.ends_with(".toml")) {
-                    Some(suite) => found.context(suite.clone())?,
-                    None => found?,
-                };
+                of_suite(self.suite.as_ref(), found.map_err(Into::into))?;
             }
         }
         for scene in &self.plan.scenes {
             scene::check_fits(&scene.source, &self.plan.load)?;
         }
-        self.check_scenes(&[])
+        of_suite(self.suite.as_ref(), self.check_scenes(&[]))
     }
 
     /// Checks that the plan of a run that was begun is still the same, and so are its

@@ -114,6 +114,14 @@ fn a_file_that_is_no_suite_is_refused_with_its_line() {
             "[[scenes]]\nscene = 'city'\npaths = ['no.csv']",
             "error: bad.toml: no.csv: No such | expected an existing file",
         ),
+        (
+            "structures = 'liner'\n[[scenes]]\nscene = 'city'",
+            "error: bad.toml: unknown structure 'liner'",
+        ),
+        (
+            "[[scenes]]\nscene = 'city:n=9'\npaths = ['orbitx']",
+            "error: bad.toml: unknown path 'orbitx'",
+        ),
         ("[[scenes", "bad.toml, line 1: | expected"),
     ] {
         let folder = with_good_files(&[("bad.toml", text.as_bytes())]);
