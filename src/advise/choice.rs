@@ -56,14 +56,14 @@ impl StructureChoice {
 
     /// Returns `true` if the one to take is a scan.
     pub fn is_scan(&self) -> bool {
-        self.taken().is_some_and(is_scan)
+        self.taken().is_some_and(ReportCell::scans)
     }
 
     /// Returns `true` if a scan and a tree are among those that tie.
     pub(super) fn is_scan_or_tree(&self) -> bool {
         let ties = |row: &ReportCell| self.ties.contains(&row.structure);
         let mut tied = alone(&self.rows).filter(|row| ties(row));
-        tied.any(|row| is_scan(row) != self.is_scan())
+        tied.any(|row| row.scans() != self.is_scan())
     }
 
     /// Adds the ties that show where the contenders are timed without the others.
@@ -81,7 +81,7 @@ impl StructureChoice {
 
     /// The fastest tree or grid and the fastest scan.
     pub(super) fn tree_and_scan(&self) -> [Option<&ReportCell>; 2] {
-        [false, true].map(|scans| alone(&self.rows).find(|row| is_scan(row) == scans))
+        [false, true].map(|scans| alone(&self.rows).find(|row| row.scans() == scans))
     }
 
     /// Their labels, for the rules: without any, `wide` and `linear`.
@@ -104,16 +104,6 @@ impl StructureChoice {
         own.sort_by_key(|label| Some(label) != self.name.as_ref());
         own
     }
-}
-
-/// Returns `true` of a scan, and of a structure that chose to be one.
-fn is_scan(cell: &ReportCell) -> bool {
-    let mut chose = cell.chose.iter().flat_map(|chose| chose.split("; "));
-    let scans = |told: &str| {
-        told.trim_start_matches("since the last build: ")
-            .starts_with("scan")
-    };
-    cell.is_scan() || chose.any(scans)
 }
 
 /// Rows with a rank on one thread.
@@ -476,23 +466,18 @@ mod tests {
         assert_eq!(choice.tree_and_scan_labels(), ["octree", "linear-scalar"]);
         assert_eq!(choice.contenders(false), ["linear-scalar", "octree"]);
         // What chooses is what it chose.
-        let mut auto = structure("auto", "tree", 1);
+        choice.rows.insert(0, structure("auto", "tree", 1));
         for (chose, tree) in [
-            ("tree, not scan of all items (modelled 1.2 x)", "auto"),
-            ("scan of all items, not tree (modelled 1.2 x)", "octree"),
+            ("tree, not scan of all items", "auto"),
             (
-                "built as scan of all items; refit in 3 of 4 updates, not scan of overwritten boxes (modelled 2 x)",
+                "built as scan of all items; refit in 3 of 4 updates",
                 "auto",
             ),
-            (
-                "since the last build: built as tree; scan of overwritten boxes in 3 of 4 updates",
-                "octree",
-            ),
+            ("since the last build: scan of all items", "octree"),
+            ("built as tree; scan of overwritten boxes", "octree"),
         ] {
-            auto.chose = Some(chose.to_owned());
-            choice.rows.insert(0, auto.clone());
+            choice.rows[0].chose = Some(chose.to_owned());
             assert_eq!(choice.tree_and_scan_labels()[0], tree, "{chose}");
-            choice.rows.remove(0);
         }
         // A plan names what was found, also what the list does not hold.
         let structures = Registry::builtin()

@@ -67,23 +67,16 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     // All may be false positives: there is no share of the visible ones.
     let judged = comparison.judged();
     let none = judged.filter(|j| j.errors.visible == 0 && j.errors.false_positives > 0);
+    let none = none.map(|judged| text::counted(judged.judged_queries, "checked view"));
     let visible = culled.map(|culled| {
         let share = 1.0 - culled;
-        let returned = text::short_percent(share);
-        let seen = match (excess, none) {
-            (Some(excess), _) => {
-                format!(
-                    "about {} visible",
-                    text::short_percent(share / (1.0 + excess))
-                )
-            }
-            (_, Some(judged)) => {
-                let views = text::counted(judged.judged_queries, "checked view");
-                format!("none visible in {views}")
-            }
-            _ => return format!("{returned} of the items are visible"),
-        };
-        format!("{returned} of the items are returned, {seen}")
+        let returned = text::short_percent(share) + " of the items are";
+        let seen = excess.map(|excess| text::short_percent(share / (1.0 + excess)));
+        match (seen, &none) {
+            (Some(seen), _) => format!("{returned} returned, about {seen} visible"),
+            (_, Some(views)) => format!("{returned} returned, none visible in {views}"),
+            _ => format!("{returned} visible"),
+        }
     });
     // Nothing if all are the culling test's own.
     let errors = judged.map(|judged| judged.errors);

@@ -174,7 +174,7 @@ fn workloads<'a>(
         all.push(((*kind).to_owned(), workload));
     }
     for (i, camera) in cameras.cameras.iter().enumerate() {
-        // Where f32 holds no six planes, which is told below, there are none.
+        // None where f32 holds no six planes, which is a line of `left_out`.
         let volumes = variants(camera, &culling.planes, &around, i).unwrap_or_default();
         for (kind, volume) in volumes.into_iter().skip(1) {
             let of_kind = all.iter_mut().find(|(name, _)| name == kind);

@@ -169,6 +169,13 @@ impl ReportCell {
         self.kind == Some(Kind::Scan)
     }
 
+    /// Returns true for a scan, and for a structure that chose to be one.
+    pub fn scans(&self) -> bool {
+        let mut chose = self.chose.iter().flat_map(|chose| chose.split("; "));
+        self.is_scan()
+            || chose.any(|told| told.starts_with("scan of ") || told.contains(": scan of "))
+    }
+
     /// Name of the metric that structures are ranked by.
     ///
     /// Time of a query, or of a frame of a motion.

@@ -190,16 +190,16 @@ impl Vector {
         let of_planes = !self.named(Level::Planes).is_empty();
         let (no_camera, no_planes) = (self.camera.is_none(), self.planes().is_none());
         let is_refused = self.camera_error().is_some();
-        let method = self.plane_method.as_ref().and_then(Value::as_str);
-        let is_other = method.is_some_and(|own| !METHODS.split(' ').any(|known| known == own));
-        let is_not = |own: &Option<Value>, wanted: &str| {
-            let text = own.as_ref().and_then(Value::as_str);
-            text.is_some_and(|own| !own.starts_with(wanted))
+        let is_other = |own: &Option<Value>, known: &str| {
+            let own = own.as_ref().and_then(Value::as_str);
+            let first = own.and_then(|own| own.split([' ', ':']).next());
+            first.is_some_and(|own| !known.split(' ').any(|known| known == own))
         };
         let found = [
-            is_not(&self.normals, "inward").then_some("normals that are not inward"),
-            is_not(&self.semantics, "closed").then_some("semantics that are not closed"),
-            is_other.then_some("a plane_method that is none of the format"),
+            is_other(&self.normals, "inward").then_some("normals that are not inward"),
+            is_other(&self.semantics, "closed").then_some("semantics that are not closed"),
+            is_other(&self.plane_method, METHODS)
+                .then_some("a plane_method that is none of the format"),
             (no_camera && (seen || is_refused)).then_some("claims about a camera but no camera"),
             (seen && is_refused).then_some("boxes seen by a camera that must be refused"),
             (no_planes && (of_planes || self.planes_error().is_some()))
@@ -344,9 +344,7 @@ fn note_unknown(bytes: &[u8], file: &str, vectors: usize) {
         let guess = match nearest(name, own.map(|[_, field]| field.as_str())) {
             Some(guess) => format!(" (did you mean '{guess}'?)"),
             None if holder == "camera" => String::new(),
-            None if ["normals", "semantics"].contains(&name.as_str()) => {
-                ": inward normals and closed bounds, n.p + d >= 0, are meant".to_owned()
-            }
+            None if name == "normals" || name == "semantics" => ": inward and closed".to_owned(),
             None => continue,
         };
         let found = format!("field '{}' of '{holder}' is not read", plain(name));
@@ -470,13 +468,9 @@ written_as! {
 }
 
 fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
-    match Option::<f64>::deserialize(deserializer)? {
-        None | Some(1.0) => Ok(()),
-        Some(other) => Err(D::Error::invalid_value(
-            Unexpected::Float(other),
-            &"format 1",
-        )),
-    }
+    let other = Option::<f64>::deserialize(deserializer)?.filter(|format| *format != 1.0);
+    let error = |other| D::Error::invalid_value(Unexpected::Float(other), &"format 1");
+    other.map(error).map_or(Ok(()), Err)
 }
 
 fn word(text: &str) -> Option<f64> {

@@ -251,7 +251,7 @@ fn verify_asks_every_kind_of_volume_test_and_arithmetic() {
     }
 }
 
-/// Spheres reach farther than boxes: here their sums overflow f32, and no others do.
+/// Spheres reach farther than boxes: only their sums overflow f32 here.
 #[test]
 fn a_test_that_f32_does_not_hold_leaves_the_others() {
     let scene =
@@ -323,7 +323,7 @@ fn verify_holds_the_default_planes_to_the_camera() {
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
 }
 
-/// Not promised without the margin, contacts are still counted beside what is missed.
+/// Contacts are counted beside what is missed, though not promised.
 #[test]
 fn verify_counts_the_contacts_that_planes_without_a_margin_drop() {
     let scene = format!("{BOXES}\n2,4,3,3,6,3.5\n30,2,3,30.5,3,4\n");
