@@ -256,7 +256,7 @@ fn page(report: &FunnelReport, scene: &Scene) -> String {
     to_page(&title, told.map(Block::line), [passed(report)], blocks)
 }
 
-/// Classes of items by the stage that removed them, the others, and those of triangles.
+/// Classes of items by the stage that removed them, and of triangles.
 const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
     "#e4e4e4", "region: not seen from the eye's region", false;
     "#c0c8d0", "object: outside of the frustum", false;

@@ -16,7 +16,7 @@ use super::run_plan::{RunPlan, same_digest};
 use super::{program, text};
 use crate::measure::{Machine, Toolchain};
 use crate::report::{
-    Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, digits, read_report,
+    Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, digits, read_report,
     read_stream, utc,
 };
 use crate::scene;
@@ -25,12 +25,6 @@ use crate::scene;
 pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFolder, Stream)> {
     let clock = SystemTime::now();
     let now = utc(clock);
-    if clock != dated(clock) {
-        tell!(
-            "note: the system's clock is out of range; the run is dated {now}; expected a year \
-             from 1970 to 9999"
-        );
-    }
     let id = digits(clock);
     let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let own = || PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug()));

@@ -154,26 +154,17 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut told = vec![Table::with(sections, columns).fitted(width)];
     let rows = || sections.iter().flat_map(|section| &section.rows);
     // Alike but for structure, test and instruction set.
-    let (mut places, mut alike) = (BTreeMap::new(), Vec::<(&Row, Vec<String>)>::new());
+    let mut alike = BTreeMap::<_, Vec<String>>::new();
     for row in rows().filter(|row| row.status == Status::Fail) {
         let by = text::some(row.kernel, |kernel| format!(" by {kernel}"));
         let key = (&row.id, row.level.name(), &row.expected, &row.got);
-        let place = *places.entry(key).or_insert(alike.len());
-        if place == alike.len() {
-            alike.push((row, Vec::new()));
-        }
-        alike[place]
-            .1
-            .push(format!("{} {}{by}", row.structure, row.test));
+        let who = alike.entry(key).or_default();
+        who.push(format!("{} {}{by}", row.structure, row.test));
     }
-    for (row, who) in alike.iter().take(MOST_SHOWN) {
-        let (id, level, who) = (
-            text::plain(&row.id),
-            row.level.name(),
-            text::first_of(who, 3),
-        );
+    for ((id, level, expected, got), who) in alike.iter().take(MOST_SHOWN) {
+        let (id, who) = (text::plain(id), text::first_of(who, 3));
         told.push(format!("{id}, {level} level, {who}:"));
-        told.push(format!("  expected {}\n  got {}", row.expected, row.got));
+        told.push(format!("  expected {expected}\n  got {got}"));
     }
     if alike.len() > MOST_SHOWN {
         let more = text::counted(alike.len() - MOST_SHOWN, "further failure");

@@ -51,9 +51,8 @@ pub fn warnings() -> Vec<String> {
     let mut all = Vec::new();
     listening(|listener| {
         let told = listener.iter().flat_map(|(_, lines, _)| lines);
-        all = told
-            .filter_map(|line| line.strip_prefix("warning: ").map(str::to_owned))
-            .collect();
+        let said = told.filter_map(|line| line.strip_prefix("warning: "));
+        all.extend(said.map(str::to_owned));
     });
     all
 }

@@ -293,32 +293,24 @@ fn rolled(scene: &Scene, taken: &[Taken]) -> Option<String> {
     let is_level = |axis, axes: &_| against(axis, axes).is_some_and(|(a, b)| a < 0.1 && b > 0.0);
     let rolled = || all.iter().filter(is_rolled);
     let (first, own) = (rolled().next()?.1, scene.up.name());
-    let count = |axis| all.iter().filter(|axes| is_level(axis, axes)).count();
     let is_up = |axis: &UpAxis| rolled().filter(|axes| is_level(*axis, axes)).count();
     let mut others = UpAxis::ALL.into_iter().filter(|axis| *axis != scene.up);
-    Some(
-        match others.find(|axis| 2 * is_up(axis) > rolled().count()) {
-            Some(other) => {
-                let count = count(other);
-                let (what, other, name) = (share(count, taken), other.name(), &scene.name);
-                // Formats that state an axis state a unit as well.
-                let is_advised = scene.unit.is_none() && 2 * count >= taken.len();
-                let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
-                let advice = advice.unwrap_or_default();
-                format!("{other} is up in {what}, {own} in {name}{advice}")
-            }
-            None => {
-                let what = share(rolled().count(), taken);
-                // -0 is 0.
-                let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
-                format!(
-                    "{what} rolled by more than 45 degrees, first with ({x:.3}, {y:.3}, {z:.3}) up; \
-                 {own} is up in {}",
-                    scene.name
-                )
-            }
-        },
-    )
+    let Some(other) = others.find(|axis| 2 * is_up(axis) > rolled().count()) else {
+        let (what, name) = (share(rolled().count(), taken), &scene.name);
+        // -0 is 0.
+        let [x, y, z] = first.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
+        return Some(format!(
+            "{what} rolled by more than 45 degrees, first with ({x:.3}, {y:.3}, {z:.3}) up; {own} \
+             is up in {name}"
+        ));
+    };
+    let count = all.iter().filter(|axes| is_level(other, axes)).count();
+    let (what, other, name) = (share(count, taken), other.name(), &scene.name);
+    // Formats that state an axis state a unit as well.
+    let is_advised = scene.unit.is_none() && 2 * count >= taken.len();
+    let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
+    let advice = advice.unwrap_or_default();
+    Some(format!("{other} is up in {what}, {own} in {name}{advice}"))
 }
 
 /// Matrices that never reach depth -1: of depths from 0 to 1, reversed.

@@ -340,8 +340,9 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
     (!whys.is_empty()).then(|| whys.join(", "))
 }
 
-/// Per process, the median over the groups of their medians over the structures; then the
-/// groups that moved relative to it. Nothing without a cell that both have timed.
+/// Medians over the groups of their medians over the structures, per process.
+///
+/// Then the groups that moved relative to it. Nothing without a cell that both have timed.
 fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<CommonShift> {
     let timed = pairs.iter().filter_map(|&pair| {
         let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();

@@ -31,6 +31,6 @@ pub(crate) use ranking::{Mean, Overall, times_as_fast};
 pub(crate) use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, read_report, read_stream, views};
 pub use stream::{Header, KeptPart, Line, Stream};
-pub(crate) use stream::{dated, digits, utc};
+pub(crate) use stream::{digits, utc};
 pub use surface::{Crossing, Growth, Place, Surface, growths, surfaces};
 pub(crate) use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};

@@ -274,14 +274,9 @@ pub fn digits(clock: SystemTime) -> String {
 /// A clock out of range gives the nearest time that a report can be dated with: it is no
 /// reason not to measure.
 pub fn utc(clock: SystemTime) -> String {
-    humantime::format_rfc3339_seconds(dated(clock)).to_string()
-}
-
-/// The nearest time of a year of four digits that is not before the epoch.
-pub fn dated(clock: SystemTime) -> SystemTime {
     // 9999-12-31T23:59:59Z.
     let last = UNIX_EPOCH + Duration::from_secs(253_402_300_799);
-    clock.clamp(UNIX_EPOCH, last)
+    humantime::format_rfc3339_seconds(clock.clamp(UNIX_EPOCH, last)).to_string()
 }
 
 /// Causes of noisy times, with advice.

@@ -49,9 +49,10 @@ impl Labels {
     }
 
     /// The labels of some of the items, any of them several times.
-    pub fn of(&self, items: impl Iterator<Item = usize>) -> Labels {
+    pub fn of(&self, items: &[u32]) -> Labels {
+        let number = |&item: &u32| self.of_item[item as usize];
         Labels {
-            of_item: items.map(|item| self.of_item[item]).collect(),
+            of_item: items.iter().map(number).collect(),
             ..self.clone()
         }
     }
@@ -99,7 +100,7 @@ mod tests {
         }
         assert_eq!((kind.get(1), kind.get(9)), ("road", ""));
         assert_eq!(kind.histogram(), [("tree", 2), ("road", 1)]);
-        let trees = kind.of([0, 0, 2].into_iter());
+        let trees = kind.of(&[0, 0, 2]);
         assert_eq!(
             (trees.get(1), trees.histogram()),
             ("tree", vec![("tree", 3)])

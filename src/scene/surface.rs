@@ -3,7 +3,6 @@
 //! It defines the form and its checks; where triangles come from is in `meshes`.
 
 use std::collections::HashMap;
-use std::iter;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -307,19 +306,17 @@ impl Scene {
         options.check_fits(&self.name, Some(count), count)?;
         let mut single = Surfaces::about(surfaces.origin);
         let mut boxes = Vec::with_capacity(surfaces.triangles.len());
+        let mut items = Vec::with_capacity(surfaces.triangles.len());
         for item in 0..surfaces.items() {
             for triangle in surfaces.of_item[item].clone() {
                 let at = triangle as usize;
                 let (kind, two_sided) = (surfaces.kinds[at], surfaces.two_sided[at]);
                 single.push(kind, two_sided, &surfaces.corners(triangle), &[[0, 1, 2]]);
                 boxes.push(surfaces.world_box(&(triangle..triangle + 1)));
+                items.push(item as u32);
             }
         }
-        let counts = surfaces.of_item.iter().map(|triangles| triangles.len());
-        let items = counts
-            .enumerate()
-            .flat_map(|(item, count)| iter::repeat_n(item, count));
-        let labels = self.labels.iter().map(|labels| labels.of(items.clone()));
+        let labels = self.labels.iter().map(|labels| labels.of(&items));
         Ok(Scene {
             up: self.up,
             unit: self.unit,

@@ -273,7 +273,7 @@ fn two_programs_are_compared_by_their_counters_alone() {
     );
 }
 
-/// Another program's build is asked of it.
+/// The other program tells how it was built.
 #[cfg(unix)]
 #[test]
 fn programs_that_are_built_differently_are_told() {

@@ -426,7 +426,7 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             "{told}"
         );
     }
-    // What is told of the cameras is on the pages too.
+    // The warnings about cameras are on the pages too.
     for line in [
         "funnel --scene z.csv --path away.csv --samples 32x18 --processes 1 --html page.html",
         "precision --scene z.csv --path away.csv --cubes 0 --processes 1 --html page.html",

@@ -119,7 +119,7 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     );
 }
 
-/// As on a full disk, where a limit on the size of files is one of the system.
+/// A limit on the size of files stands for a full disk.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_run_that_cannot_be_written_says_how_it_goes_on() {
