@@ -48,19 +48,16 @@ pub fn tell_warnings() {
 
 /// All warnings so far, told or not.
 pub fn warnings() -> Vec<String> {
-    let mut all = Vec::new();
     listening(|listener| {
         let told = listener.iter().flat_map(|(_, lines, _)| lines);
-        let said = told.filter_map(|line| line.strip_prefix("warning: "));
-        all.extend(said.map(str::to_owned));
-    });
-    all
+        let told = told.filter_map(|line| line.strip_prefix("warning: "));
+        told.map(str::to_owned).collect()
+    })
 }
 
 /// Does something without its notes and warnings.
 pub fn unheard<T>(work: impl FnOnce() -> T) -> T {
-    let mut kept = None;
-    listening(|listener| kept = listener.take());
+    let kept = listening(Option::take);
     let done = work();
     listening(|listener| *listener = kept);
     done
@@ -77,6 +74,6 @@ fn once(line: String, act: impl FnOnce(&mut Told, String)) {
     });
 }
 
-fn listening(act: impl FnOnce(&mut Option<Told>)) {
-    act(&mut LISTENER.lock().unwrap_or_else(PoisonError::into_inner));
+fn listening<T>(act: impl FnOnce(&mut Option<Told>) -> T) -> T {
+    act(&mut LISTENER.lock().unwrap_or_else(PoisonError::into_inner))
 }

@@ -68,7 +68,9 @@ impl<'r> Comparison<'r> {
         self.of_any("visible_count") == Some(0.0)
     }
 
-    /// Returns true if its ranks decide: the fastest of empty answers is no advice.
+    /// Returns true if its ranks tell anything.
+    ///
+    /// The fastest of empty answers is no advice.
     pub fn decides(&self) -> bool {
         !self.is_blind() && self.winners().next().is_some()
     }
