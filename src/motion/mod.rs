@@ -196,7 +196,7 @@ impl Motion {
         let mut each: Vec<usize> = path.times.chunk_by(f64::eq).map(<[f64]>::len).collect();
         each.dedup();
         if let [each] = each[..]
-            && views % each > 0
+            && !views.is_multiple_of(each)
             && each < path.times.len()
         {
             let what = format_args!("{each} cameras at each time_s and {views} to a frame");

@@ -73,8 +73,8 @@ impl CameraFacts {
         let taken = taken_apart(cameras);
         let one = |(camera, found): &Taken| {
             // Of a matrix without a lens the matrix itself.
-            let own = |found: &Box<Unprojected>| found.camera.lens;
-            let lens = found.as_ref().map_or(camera.lens, own);
+            let own = |found: &Unprojected| found.camera.lens;
+            let lens = found.as_deref().map_or(camera.lens, own);
             let height = lens.height_at(1.0).filter(|_| lens.is_orthographic());
             let [fovy_deg, aspect] = shape(&lens);
             let values = [fovy_deg, height, aspect, Some(lens.near())];

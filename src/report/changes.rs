@@ -4,7 +4,7 @@
 //! of its group, process by process: what moves a whole process, and most of what tells two days
 //! apart, drops out.
 
-use std::fmt;
+use std::{fmt, slice};
 
 use serde::Serialize;
 
@@ -379,7 +379,8 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
         cells,
     };
     let cells = whole.iter().map(|group| group.1.len()).sum();
-    let as_a_whole = judged(&[common.clone()], 0.0)[0].map(|found| shift(None, found, cells));
+    let as_a_whole =
+        judged(slice::from_ref(&common), 0.0)[0].map(|found| shift(None, found, cells));
     let relative = own.iter().map(|own| {
         let less = |side: usize| {
             own[side]
