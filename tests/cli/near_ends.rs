@@ -85,6 +85,6 @@ fn each_convention_says_which_end_is_near() {
     }
     let line = "scene info city:n=150 --path m.csv --matrix-convention column-d3d-reversed";
     let told = works(folder.path(), line).replace(['\n', ' '], "");
-    let wanted = "depth1to0bythisname,mirrored;thefirst:centreofthenearplane(aseye)(-20,3,30)";
+    let wanted = "thefirst:depth1to0bythisname,mirrored,centreofthenearplane(aseye)(-20,3,30)";
     assert!(told.contains(wanted), "{told}");
 }
