@@ -16,7 +16,7 @@ use crate::index::{FrustumQuery, Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, plane_test};
-use crate::shown::{count, counted};
+use crate::shown::{count, counted, significant};
 
 /// Share of the planes above which the saving is lost in noise.
 const MOST_NEEDED: f64 = 0.99;
@@ -157,7 +157,7 @@ pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
             return Finding::none("no camera was judged");
         };
         let draw_ns = advice.draw_ns;
-        let reason = format!("with {draw_ns} ns/item drawn");
+        let reason = format!("with {} ns/item drawn", significant(draw_ns));
         let finding = Finding::new(more * draw_ns, exact.ns - six.ns, reason);
         following(finding, &advice.test)
     }))
