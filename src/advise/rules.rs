@@ -200,7 +200,6 @@ pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'
     FunnelInput {
         structures,
         all: false,
-        picks: false,
         ..FunnelInput::new(setting, chain, (most, SAMPLES), tree.execution)
     }
 }

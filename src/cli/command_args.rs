@@ -87,8 +87,8 @@ pub struct FunnelArgs {
     /// Back end of the fragment stage
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// Compare every back end of every stage, draw orders and picking too, as --format
-    /// json, --csv and --html do
+    /// Compare every back end of every stage, picking too, as --format json, --csv and
+    /// --html do
     #[arg(long)]
     pub all: bool,
     /// Leave picking out of what --all, --format, --csv and --html add

@@ -420,7 +420,7 @@ fn shift_line(shift: &CommonShift) -> String {
     let why = if is_open { "" } else { unknown };
     match &shift.group {
         Some(group) => format!(
-            "{}: beside the other scenes {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}",
+            "{}: beside the others {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}",
             place(group, usize::MAX, text::plain)
         ),
         None => format!("as a whole {metric} of NEW is {ratio} %{interval} of OLD ({cells}){why}"),

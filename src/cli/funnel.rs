@@ -16,7 +16,6 @@ use super::page::to_page;
 use super::plan::Plan;
 use super::processes::Timing;
 use super::query::cell;
-use super::run_verdict::BLIND;
 use super::shared_args::TableFormat;
 use super::sheet::Class;
 use super::study::{ROUNDS, Study, load, note_solid};
@@ -76,7 +75,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
             && row.errors.output_count == 0.0
     };
     if report.stages[0].errors.truth_count == 0.0 && report.stages.iter().any(is_empty) {
-        report.conclusions = vec![BLIND.to_owned()];
+        let views = text::counted(report.views, "view");
+        let what = "Nothing is to be taken: no item is seen in the";
+        report.conclusions = vec![format!("{what} the {views} used.")];
     }
     note_solid(&setting.scene, args.format);
     let table = || show(&funnel_table::blocks(&report, args.all));

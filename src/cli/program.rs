@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
+use super::text::quoted;
 use crate::measure::Source;
 use crate::spec::{SpecError, nearest};
 
@@ -117,9 +118,12 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         found = format!("{found} {}", missing.join(", "));
     }
     let word = found.split('\'').nth(1).unwrap_or_default();
-    let is_scene = usage.as_ref().is_some_and(|usage| !usage.contains('<'));
-    if error.kind() == ErrorKind::UnknownArgument && is_scene && Path::new(word).is_file() {
-        expected = Some(format!("; did you mean '--scene {word}'?"));
+    let is_run = usage
+        .as_ref()
+        .is_some_and(|usage| usage.ends_with(" run [OPTIONS]"));
+    let is_bare = error.kind() == ErrorKind::UnknownArgument && Path::new(word).is_file();
+    if is_run && is_bare && env::args().all(|arg| !arg.starts_with("--scene")) {
+        expected = Some(format!("; did you mean '--scene {}'?", quoted(word)));
     }
     let usage = usage.map(|usage| format!("; expected {usage}"));
     let help = "; see --help".to_owned();

@@ -37,9 +37,10 @@ pub fn times(ratio: f64) -> String {
 /// Conclusion of one or several scenes and paths in sentences.
 pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
     let base = overall.base;
+    let is_blind = all.iter().any(|c| c.is_blind()) && !all.iter().any(|c| c.decides());
     let (first, is_alone) = match all {
         [one] => (ranking(one, base), one.sound().nth(1).is_none()),
-        _ if all.iter().all(|c| c.is_blind()) => (BLIND.to_owned(), true),
+        _ if is_blind => (BLIND.to_owned(), true),
         _ => (standing(all, overall), overall.standings.len() < 2),
     };
     let mut told = vec![first];
@@ -323,11 +324,8 @@ fn standing(all: &[&Comparison], overall: &Overall) -> String {
         told += &format!("{whose} {}", leads.join(", "));
     }
     let firsts: Vec<String> = tied.iter().map(|s| s.first_in.to_string()).collect();
-    let deciding = all.iter().filter(|c| c.decides()).count();
-    told += &format!(
-        "; first or tied in {} of {deciding}.",
-        listed(&firsts, "and")
-    );
+    let of = all.iter().filter(|c| c.decides()).count();
+    told += &format!("; first or tied in {} of {of}.", listed(&firsts, "and"));
     let blind = all.iter().filter(|c| c.is_blind()).count();
     told += &text::any(blind, "row", |rows| {
         format!(" {rows} left out: no camera sees an item.")

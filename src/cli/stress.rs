@@ -167,7 +167,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         told.push(format!("  expected {expected}\n  got {got}"));
     }
     if alike.len() > MOST_SHOWN {
-        let more = text::counted(alike.len() - MOST_SHOWN, "further failure");
+        let more = text::counted(alike.len() - MOST_SHOWN, "further kind");
         told.push(format!("{more}: --format json"));
     }
     let mut tally = Tally::default();

@@ -54,7 +54,7 @@ impl<'b> TableReader<'b> {
         const OTHERS: [(&[u8], &str); 3] = [
             (b"\x1f\x8b", "gzip, which is not read"),
             (b"PK\x03\x04", "a zip archive, no table"),
-            (b"glTF", "binary glTF; its cameras are path places"),
+            (b"glTF", "binary glTF, no table"),
         ];
         if let Some((_, found)) = OTHERS.iter().find(|other| bytes.starts_with(other.0)) {
             return Err(no_text(0, found));

@@ -349,6 +349,7 @@ pub fn measure_loaded(
             Err(verdict) => {
                 let mut part = Part::of_failed(&key, &plan.structures, &verdict);
                 part.path.camera_count = path.cameras.len();
+                part.path.digest = key.motion.is_empty().then(|| path::digest(&path.cameras));
                 (part.process, part.scene) = (share.process, info.clone());
                 part.failed.clone_from(&share.failed);
                 keep(part, Vec::new());

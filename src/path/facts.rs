@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::calibrate::{MOST_TESTS, every_nth};
 use super::{CameraPath, LensDefaults};
 use crate::camera::{Camera, FARTHEST, Lens, LensKind, PlaneOptions, Unprojected, ViewProjection};
-use crate::geometry::Aabb;
-use crate::input::{names_file, note};
+use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::{counted, significant};
 
@@ -189,7 +188,6 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
         upward_parallel(scene, cameras),
         far_outside(scene, cameras),
         blind(scene, cameras),
-        coarse(scene, cameras).filter(|_| names_file(path)),
     ];
     doubts.into_iter().flatten().map(told).collect()
 }
@@ -236,7 +234,7 @@ fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
 /// projections without a view.
 fn bare(cameras: &[Camera]) -> Option<String> {
     let is_lone = |camera: &Camera| camera.lens.matrix().is_some_and(ViewProjection::is_lone);
-    if !cameras.is_empty() && cameras.iter().all(is_lone) {
+    if cameras.len() > 1 && cameras.iter().all(is_lone) {
         let what = "all matrices with the eye at 0 and the axes of the world, as without a view";
         return Some(format!("{what}; expected projection x view"));
     }
@@ -365,7 +363,11 @@ fn sheared(taken: &[Taken]) -> Option<String> {
 /// Matrices of a left-handed world beside a scene whose format is right-handed.
 fn left_handed(scene: &Scene, taken: &[Taken]) -> Option<String> {
     let is_right_handed = scene.unit.is_some() || scene.surfaces.is_some();
-    let is_mirrored = |(_, found): &Taken| found.as_ref().is_some_and(|found| found.is_mirrored);
+    // Which end of depth is near is not known of parallel rays, and decides it.
+    let is_mirrored = |(camera, found): &Taken| {
+        let found = found.as_ref().filter(|_| !camera.lens.is_orthographic());
+        found.is_some_and(|found| found.is_mirrored)
+    };
     let is_left_handed = taken.iter().all(is_mirrored) && upward(taken, scene.up) > SLANTED;
     let what = "all cameras mirrored, as in a left-handed world; capture its boxes instead of";
     (is_right_handed && is_left_handed).then(|| format!("{what} {}, its mirror image", scene.name))
@@ -397,19 +399,6 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
         scene.name,
         significant(farthest)
     ))
-}
-
-/// Near planes that no file gives, in a scene of far smaller items.
-fn coarse(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    let defaults = LensDefaults::default().of_scene(scene);
-    let default = |lens: &Lens| defaults.near_of(lens.far());
-    let is_default = |camera: &&Camera| camera.lens.near() == default(&camera.lens);
-    let near = cameras.iter().find(is_default)?.lens.near();
-    let is_smaller = |b: &&Aabb| f64::from(b.extent().max_element()) < near;
-    let smaller = scene.items.iter().filter(is_smaller).count();
-    let (near, all) = (significant(near), scene.items.len());
-    let what = format!("near {near}, as none is given: larger than {smaller} of {all} items");
-    (10 * smaller > 9 * all).then(|| what + "; --near if nearer ones count")
 }
 
 /// Views that all miss all items; of large scenes fewer views.

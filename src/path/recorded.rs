@@ -56,7 +56,7 @@ impl LensDefaults {
     }
 
     /// Near plane of a recorded camera whose far plane may lie far behind the scene.
-    pub(super) fn near_of(&self, far: Option<f64>) -> f64 {
+    fn near_of(&self, far: Option<f64>) -> f64 {
         let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
         far.min(self.reach) / FAR_IN_NEARS
     }
@@ -242,7 +242,7 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
                     .ok()
                     .filter(|far: &f64| *far > f64::NEG_INFINITY);
                 let found = || format!("far '{}'", shortened(text, 60));
-                let comma = finite(text).err().filter(|_| text.contains(','));
+                let comma = finite(text).err().filter(|why| why.contains("comma"));
                 let expected = comma.unwrap_or("a number above 0, inf or nothing");
                 let refused = || row.error(found(), expected);
                 let far = far.ok_or_else(refused)?;

@@ -367,8 +367,7 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
     let common: Logs = middle(&Vec::from_iter(&own));
     let judged = |shifts: &[Logs], threshold| {
         let [was, is] = [0, 1].map(|side| Vec::from_iter(shifts.iter().map(|s| s[side].clone())));
-        let names: Vec<((), usize)> = (0..shifts.len()).map(|group| ((), group)).collect();
-        judge_unpaired(&was, &is, &names, threshold)
+        judge_unpaired(&was, &is, &vec![((), ()); shifts.len()], threshold)
     };
     let shift = |group: Option<&GroupKey>, found: Judgement, cells| CommonShift {
         group: group.cloned(),

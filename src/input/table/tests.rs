@@ -168,10 +168,7 @@ fn text_of_another_form_is_named() {
             b"PK\x03\x04\0",
             "line 1: a zip archive, no table; expected UTF-8",
         ),
-        (
-            b"glTF\x02\0\0\0",
-            "line 1: binary glTF; its cameras are path places",
-        ),
+        (b"glTF\x02\0\0\0", "line 1: binary glTF, no table"),
         (
             &little,
             "line 1: zero bytes, as in UTF-16 text; expected UTF-8",

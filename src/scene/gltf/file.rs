@@ -202,7 +202,10 @@ impl<'f> File<'f> {
             return Err(error(&found, "a file beside this one"));
         }
         let place = format!("{}, buffers[{buffer}].uri", self.name);
-        beside(&decoded(uri)).map_err(|found| InputError::new(format_args!("{place}: {found}")))
+        beside(&decoded(uri)).map_err(|found| match found.to_string() {
+            told if told.starts_with(self.name) => found,
+            told => InputError::new(format_args!("{place}: {told}")),
+        })
     }
 
     pub fn error(&self, place: impl Display, found: impl Display, expected: &str) -> InputError {
