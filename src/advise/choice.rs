@@ -334,8 +334,8 @@ mod tests {
     use super::super::case::planned;
     use super::*;
     use crate::index::{Registry, UpdatePolicy};
-    use crate::measure::ProcessTimes;
-    use crate::statistics::rate_of;
+    use crate::measure::{Metric, ProcessTimes};
+    use crate::statistics::{Estimate, rate_of};
 
     /// The tests near the least, over processes that are each a little off.
     ///
@@ -465,19 +465,24 @@ mod tests {
         ];
         assert_eq!(choice.tree_and_scan_labels(), ["octree", "linear-scalar"]);
         assert_eq!(choice.contenders(false), ["linear-scalar", "octree"]);
-        // What chooses is what it chose.
+        // What chooses is a scan where it tested most items.
         choice.rows.insert(0, structure("auto", "tree", 1));
-        for (chose, tree) in [
-            ("tree, not scan of all items", "auto"),
+        choice.rows[0].scene.total_count = 100;
+        for (chose, tested, tree) in [
+            (Some("tree"), 20.0, "auto"),
+            (Some("scan of all items"), 100.0, "octree"),
             (
-                "built as scan of all items; refit in 3 of 4 updates",
-                "auto",
+                Some("built as tree; scan of overwritten boxes"),
+                95.0,
+                "octree",
             ),
-            ("since the last build: scan of all items", "octree"),
-            ("built as tree; scan of overwritten boxes", "octree"),
+            (None, 95.0, "auto"),
         ] {
-            choice.rows[0].chose = Some(chose.to_owned());
-            assert_eq!(choice.tree_and_scan_labels()[0], tree, "{chose}");
+            let row = &mut choice.rows[0];
+            row.chose = chose.map(str::to_owned);
+            let tested = Metric::of(Estimate::exact(tested), "1");
+            row.metrics.insert("items_tested".to_owned(), tested);
+            assert_eq!(choice.tree_and_scan_labels()[0], tree, "{chose:?}");
         }
         // A plan names what was found, also what the list does not hold.
         let structures = Registry::builtin()

@@ -68,17 +68,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
         let reason = verdict.reason.as_deref().unwrap_or("no reason");
         bail!("a stage failed when it was timed: {reason}");
     }
-    let mut report = prepared.conclude(&times);
-    let is_empty = |row: &StageRow| {
-        row.is_chosen
-            && row.back_end.stage == StageKind::Occlusion
-            && row.errors.output_count == 0.0
-    };
-    if report.stages[0].errors.truth_count == 0.0 && report.stages.iter().any(is_empty) {
-        let views = text::counted(report.views, "view");
-        let what = "Nothing is to be taken: no item is seen in the";
-        report.conclusions = vec![format!("{what} the {views} used.")];
-    }
+    let report = prepared.conclude(&times);
     note_solid(&setting.scene, args.format);
     let table = || show(&funnel_table::blocks(&report, args.all));
     let shown = print(args.format, &report, table);

@@ -118,9 +118,7 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         found = format!("{found} {}", missing.join(", "));
     }
     let word = found.split('\'').nth(1).unwrap_or_default();
-    let is_run = usage
-        .as_ref()
-        .is_some_and(|usage| usage.ends_with(" run [OPTIONS]"));
+    let is_run = env::args().nth(1).as_deref() == Some("run");
     let is_bare = error.kind() == ErrorKind::UnknownArgument && Path::new(word).is_file();
     if is_run && is_bare && env::args().all(|arg| !arg.starts_with("--scene")) {
         expected = Some(format!("; did you mean '--scene {}'?", quoted(word)));

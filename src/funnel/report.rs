@@ -252,12 +252,20 @@ fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
 /// The sentences are on back ends that lost items, and the stencil.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
-    let last = report.stages.iter().find(is_last).map(|last| {
+    let last = report.stages.iter().find(is_last);
+    let seen = report.stages[0].errors.truth_count;
+    if seen == 0.0 && last.is_some_and(|last| last.errors.output_count == 0.0) {
+        let views = counted(report.views, "view");
+        return vec![format!(
+            "Nothing is to be taken: no item is seen in the {views} used."
+        )];
+    }
+    let last = last.map(|last| {
         format!(
             "Of {} {} remain to be drawn and {} are in front at some sample, per view.",
             counted(report.items, "item"),
             significant(last.errors.output_count),
-            significant(report.stages[0].errors.truth_count)
+            significant(seen)
         )
     });
     let inner = report.inner_boxes.as_ref();

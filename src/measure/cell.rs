@@ -169,11 +169,11 @@ impl ReportCell {
         self.kind == Some(Kind::Scan)
     }
 
-    /// Returns true for a scan, and for a structure that chose to be one.
+    /// Returns true for a scan, and for a structure that chooses and tested most items.
     pub fn scans(&self) -> bool {
-        let mut chose = self.chose.iter().flat_map(|chose| chose.split("; "));
-        self.is_scan()
-            || chose.any(|told| told.starts_with("scan of ") || told.contains(": scan of "))
+        let tested = self.value("items_tested").filter(|_| self.chose.is_some());
+        let half = 0.5 * self.scene.total_count as f64;
+        self.is_scan() || tested.is_some_and(|tested| tested > half)
     }
 
     /// Name of the metric that structures are ranked by.
