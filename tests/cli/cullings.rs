@@ -290,6 +290,12 @@ fn a_test_that_f32_does_not_hold_leaves_the_others() {
             is_refused,
             "{cell}"
         );
+        // Other cameras are another question, of refused cells too.
+        let digest = &cell["path"]["digest"];
+        assert!(
+            digest.is_string() && *digest == cells(&report)[0]["path"]["digest"],
+            "{cell}"
+        );
     }
     // Where nothing is left.
     let alone = cullbench(here.path(), &format!("{run} --test sphere --out alone"));
