@@ -238,7 +238,8 @@ pub struct CompareArgs {
     /// Measure of a regression
     #[arg(long, value_enum, default_value = "time")]
     pub gate: Gate,
-    /// Exit with 3 as well where a cell is inconclusive, or where all together changed
+    /// Exit with 3 as well where a cell is inconclusive or different, or where all together
+    /// changed
     #[arg(long)]
     pub fail_inconclusive: bool,
     /// Show unchanged cells and every column as well

@@ -151,7 +151,7 @@ fn expect_judged(changes: &Changes) -> anyhow::Result<()> {
     let of_first = |row: &JudgedRow| format!(" ({}: {})", name(&row.cell), reason(row));
     ensure!(
         !changes.judges_nothing(),
-        "nothing can be judged: of {} in common, {different} not the same question, {} without \
+        "nothing can be judged: of {} in common, {different} with another question or answer, {} without \
          a figure{}; expected runs of the same scenes, cameras and metrics",
         text::counted(cells, "cell"),
         cells - different,

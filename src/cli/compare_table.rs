@@ -46,7 +46,8 @@ pub struct CompareTable<'a> {
 impl CompareTable<'_> {
     /// 1 for a wrong answer, otherwise 3 for a regression; and its name in JSON.
     pub fn verdict(&self) -> (Ending, &'static str) {
-        let is_undecided = self.changes.count(Outcome::Inconclusive) > 0
+        let open = [Outcome::Inconclusive, Outcome::Different];
+        let is_undecided = open.iter().any(|open| self.changes.count(*open) > 0)
             || !self.changes.proven_shifts().is_empty();
         match (self.changes.is_wrong(), self.changes.is_regression()) {
             (true, _) => (Ending::WrongAnswer, "wrong_answer"),

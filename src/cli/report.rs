@@ -24,8 +24,8 @@ use super::{
 };
 use crate::measure::{Metric, Status};
 use crate::report::{
-    Comparison, Overall, Report, RunInfo, Views, asked_otherwise, comparisons, folder_of, grouped,
-    read_report, save_page, settings, timed_otherwise, views,
+    Comparison, Overall, Report, RunInfo, Views, answered_otherwise, asked_otherwise, comparisons,
+    folder_of, grouped, read_report, save_page, settings, timed_otherwise, views,
 };
 
 pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -333,7 +333,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
     let cells = cells.flat_map(|(run, report)| report.cells.iter().map(move |cell| (run, cell)));
     let cells = cells.map(|(run, cell)| (cell.key().group, (cell.structure.as_str(), (run, cell))));
     let mut blocks = Vec::new();
-    let mut ratios = Vec::new();
+    let (mut ratios, mut others) = (Vec::new(), 0);
     for (group, cells) in grouped(cells) {
         let heading = format!("{}, {}", group.scene, question(&group));
         let per = ["query", "frame"][usize::from(!group.motion.is_empty())];
@@ -346,14 +346,18 @@ pub fn history(mut reports: Vec<Report>) -> String {
             // The same name does not make it the same question.
             let differs = |cell| {
                 let pair = (cell, last?);
-                asked_otherwise(pair).or_else(|| timed_otherwise(pair))
+                let all = [asked_otherwise, answered_otherwise, timed_otherwise];
+                all.iter().find_map(|why| why(pair))
             };
+            others += usize::from(sound.clone().any(|(_, cell)| differs(*cell).is_some()));
             let sound = sound.filter(|(_, cell)| differs(*cell).is_none());
             let times = sound.filter_map(|&(run, cell)| Some((run, cell.time()?)));
             let times = times.filter(|(_, time)| is_drawn(time.value));
             let times: Vec<(usize, &Metric)> = times.collect();
             let mut change = String::new();
-            if let [(_, first), .., (_, last)] = times[..] {
+            if let [(_, first), .., (run, last)] = times[..]
+                && cells.last().is_some_and(|newest| newest.0 == run)
+            {
                 let ratio = last.value / first.value;
                 change = format!("{} x", text::significant(ratio));
                 ratios.push(ratio);
@@ -408,7 +412,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
     let title = format!("{} history of {runs_shown}", program::name());
     let mut all = vec![
         Block::Heading(1, title.clone()),
-        Block::Line(conclusion(&reports, &ratios)),
+        Block::Line(conclusion(&reports, &ratios, others)),
     ];
     all.extend(blocks);
     all.extend(Block::section("Runs", runs(&reports, &run_names)));
@@ -420,11 +424,19 @@ pub fn history(mut reports: Vec<Report>) -> String {
 ///
 /// Times of two runs one after the other differ for the machine's sake alone: no change is
 /// counted or named.
-fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
+fn conclusion(reports: &[Report], ratios: &[f64], others: usize) -> String {
     let end = |of: fn(f64, f64) -> f64| ratios.iter().copied().reduce(of);
     let ends = end(f64::min).zip(end(f64::max));
+    let newest = reports.last().map_or(&[][..], |last| &last.cells);
+    let failed = newest.iter().filter(|cell| cell.status.is_failure());
+    let failed = text::any(failed.count(), "wrong answer", |failed| {
+        format!("The last run has {failed}. ")
+    });
+    let others = text::any(others, "cell", |cells| {
+        format!(" Of {cells} questions or answers differ between the runs.")
+    });
     let ([first, .., last], Some((least, most))) = (reports, ends) else {
-        return "No structure has times in two runs that can be compared.".to_owned();
+        return format!("{failed}No structure has times in two runs that can be compared.{others}");
     };
     let settings = settings(first, last);
     let note = text::some(settings.first(), |_| {
@@ -438,8 +450,8 @@ fn conclusion(reports: &[Report], ratios: &[f64]) -> String {
     let factor = if least == most { least } else { all };
     let take = ["takes", "take"][usize::from(ratios.len() > 1)];
     format!(
-        "Over {runs} {cells} {take} {factor} x as long in the last run that has times of them as in \
-         the first, by program and machine together. compare judges two runs.{note}"
+        "{failed}Over {runs} {cells} {take} {factor} x as long in the last run that has times of them as in \
+         the first, by program and machine together. compare judges two runs.{others}{note}"
     )
 }
 

@@ -13,6 +13,7 @@ use super::index_under_test::{MOST_UPDATED, TWIN};
 use super::metrics::{METRICS, MetricInfo, Of};
 use super::process_result::{Known, Part, SubjectPart, TaskPart};
 use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, TwinEntry, Verdict};
+use crate::shown::hex;
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
@@ -187,10 +188,18 @@ impl<'p> MergedParts<'p> {
             times: self.times(label),
             metrics: self.metrics(label, subject, judged.as_ref(), is_right),
             error: judged,
+            answers: subject.filter(|_| is_right).and(self.answers()),
             left_out: left_out.unwrap_or_default(),
             samples_ref: None,
             chose: self.subjects(label).find_map(|s| s.chose.clone()),
         }
+    }
+
+    /// Digest of the right answers of all frustum queries.
+    fn answers(&self) -> Option<String> {
+        let ids = self.known?.visible.iter();
+        let bytes: Vec<u8> = ids.flat_map(|answer| answer.digest.to_le_bytes()).collect();
+        (!bytes.is_empty()).then(|| hex(&hmac_sha256::Hash::hash(&bytes)))
     }
 
     /// Metrics that this cell lacks though its structure is right, with the reason.

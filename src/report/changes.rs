@@ -9,10 +9,11 @@ use std::{fmt, slice};
 use serde::Serialize;
 
 use super::judging::{COUNTERS, Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, WorkChange};
-use super::ranking::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
+use super::ranking::{
+    Pair, answered_otherwise, asked_otherwise, grouped, matched, timed_otherwise,
+};
 use super::{Report, ReportCell};
 use crate::measure::{GroupKey, Machine, Status, Toolchain};
-use crate::shown::number;
 use crate::statistics::{Change, Judgement, judge, judge_unpaired, median, trimmed_mean};
 
 /// Fewer other structures cannot tell which of them moved: the median of three
@@ -56,19 +57,28 @@ pub fn changes(
         only_in_new,
         ..Changes::default()
     };
-    let mut comparable = Vec::new();
+    let (mut counted, mut timed) = (Vec::new(), Vec::new());
     for pair in pairs {
         if asked_otherwise(pair).is_none() {
             found.work_changed.extend(work_changes(pair));
         }
-        match as_a_whole(basis, pair) {
-            Some(row) => found.rows.push(row),
-            None => comparable.push(pair),
+        if let Some(row) = as_a_whole(pair) {
+            found.rows.push(row);
+            continue;
         }
+        counted.push(pair);
+        let different = answered_otherwise(pair);
+        // Two programs may round planes differently.
+        if basis == Basis::Pairs || different.is_none() {
+            timed.push(pair);
+        }
+        let different = different.map(|why| row(pair, Outcome::Different, Some(why)));
+        found.rows.extend(different);
     }
     for &metric in metrics {
-        let own = of_metric(&comparable, metric);
-        found.rows.extend(match WORK.contains(&metric) {
+        let is_work = WORK.contains(&metric);
+        let own = of_metric(if is_work { &counted } else { &timed }, metric);
+        found.rows.extend(match is_work {
             true => by_work(&own, metric, threshold),
             false => by_metric(basis, &own, metric, threshold),
         });
@@ -114,24 +124,19 @@ fn row((old, new): Pair, outcome: Outcome, reason: Option<String>) -> JudgedRow 
     }
 }
 
-/// Outcome of a pair by its statuses and questions alone; `None` if times decide.
-fn as_a_whole(basis: Basis, pair: Pair) -> Option<JudgedRow> {
+/// Outcome of a pair by its statuses and questions alone; `None` if figures decide.
+fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     let (old, new) = pair;
     let by_status = Outcome::of_statuses(old.status, new.status);
-    let different = |reason: String| row(pair, Outcome::Different, Some(reason));
     // Wrong is wrong, whatever the question was.
     if by_status != Some(Outcome::Broken)
         && let Some(reason) = asked_otherwise(pair)
     {
-        return Some(different(reason));
+        return Some(row(pair, Outcome::Different, Some(reason)));
     }
-    match by_status {
-        Some(Outcome::Gained) => Some(row(pair, Outcome::Gained, old.reason.clone())),
-        Some(outcome) => Some(row(pair, outcome, new.reason.clone())),
-        // Two programs may round planes differently: their work has changed.
-        None if basis == Basis::Pairs => None,
-        None => answered_otherwise(pair).map(different),
-    }
+    let outcome = by_status?;
+    let of = if outcome == Outcome::Gained { old } else { new };
+    Some(row(pair, outcome, of.reason.clone()))
 }
 
 /// A pair with both values of a metric, not yet judged.
@@ -140,13 +145,6 @@ fn valued(pair: Pair, metric: &'static str) -> JudgedRow {
     row.metric = Some(metric);
     (row.old, row.new) = (pair.0.value(metric), pair.1.value(metric));
     row
-}
-
-/// Right answers to one question have the same length.
-fn answered_otherwise((old, new): Pair) -> Option<String> {
-    let counts = old.value("visible_count").zip(new.value("visible_count"));
-    let (was, is) = counts.filter(|(was, is)| was != is)?;
-    Some(format!("visible_count {} and {}", number(was), number(is)))
 }
 
 /// ln(time) in each process, old and new.

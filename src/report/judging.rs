@@ -53,7 +53,7 @@ named! {
         Slower = "slower",
         /// Tests more nodes, items or planes, by more than the threshold.
         MoreWork = "more_work",
-        /// Not the same question: not judged.
+        /// Not the same question, or another answer: times of stored runs are not judged.
         Different = "different",
         /// No time above zero on one side at least: not judged.
         #[default]

@@ -28,7 +28,7 @@ pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION};
 pub use ranking::{Comparison, comparisons};
 pub(crate) use ranking::{Mean, Overall, times_as_fast};
-pub(crate) use ranking::{asked_otherwise, grouped, timed_otherwise, unique};
+pub(crate) use ranking::{answered_otherwise, asked_otherwise, grouped, timed_otherwise, unique};
 pub use reading::{Reading, Views, read_report, read_stream, views};
 pub use stream::{Header, KeptPart, Line, Stream};
 pub(crate) use stream::{digits, utc};

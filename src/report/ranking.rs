@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use super::{Report, ReportCell};
 use crate::measure::{CellTimes, GroupKey, Judged, Metric, Status, YARDSTICK};
+use crate::shown::number;
 use crate::statistics::{ALPHA, Estimate, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
@@ -195,6 +196,16 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     let both = old.path.digest.as_ref().zip(new.path.digest.as_ref());
     let cameras = both.and_then(|(was, is)| digests("other cameras or motions", was, is));
     items.or(count).or(cameras)
+}
+
+/// The reason why right answers to one question are not the same sets; `None` if they are.
+pub fn answered_otherwise((old, new): Pair) -> Option<String> {
+    let counts = old.value("visible_count").zip(new.value("visible_count"));
+    if let Some((was, is)) = counts.filter(|(was, is)| was != is) {
+        return Some(format!("visible_count {} and {}", number(was), number(is)));
+    }
+    let (was, is) = old.answers.as_ref().zip(new.answers.as_ref())?;
+    (was != is).then(|| "other ids, as many as before".to_owned())
 }
 
 /// The reason why two times are not of the same work; `None` if they are.

@@ -180,6 +180,17 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     assert_eq!(plots[0].matches("<polygon class=\"mark").count(), 4);
     assert_eq!(plots[0].matches("class=\"interval\"").count(), 4);
     assert!(page.contains(": time per query in each run, 95 % interval</"));
+    // Neither a wrong answer nor another one has a change.
+    let mut wrong = new.clone();
+    wrong["cells"][0]["answers"] = json!("other");
+    wrong["cells"][1]["status"] = json!("wrong");
+    fs::write(folder.path().join("wrong.json"), wrong.to_string()).expect("writable");
+    works(folder.path(), "report wrong.json old --history wrong.html");
+    let page = fs::read_to_string(folder.path().join("wrong.html")).expect("a page");
+    assert!(page.contains("<p>The last run has 1 wrong answer. No structure has times in two"));
+    assert!(page.contains("Of 1 cell questions or answers differ between the runs.</p>"));
+    assert!(page.contains("other ids, as many as before</td>"), "{page}");
+    assert!(!page.contains("1,000 x"));
     // Another question of the same name is left out, and says so.
     // Runs of one commit have their starts too.
     new["source"] = report["source"].clone();
@@ -192,7 +203,9 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     works(folder.path(), "report new.json old --history other.html");
     let page = fs::read_to_string(folder.path().join("other.html")).expect("a page");
     assert!(page.contains(": time per query in each run</"), "{page}");
-    assert!(page.contains("<p>No structure has times in two runs that can be compared.</p>"));
+    let others = "Of 2 cells questions or answers differ between the runs.";
+    let none = "<p>No structure has times in two runs that can be compared.";
+    assert!(page.contains(&format!("{none} {others}</p>")));
     assert_eq!(page.matches("8 cameras and 80</td>").count(), 2);
     let commits = usize::from(report["source"]["commit"].is_string());
     assert_eq!(

@@ -3,6 +3,8 @@
 use super::super::ranking::tests::cell;
 use super::super::settings;
 use super::*;
+use crate::measure::Metric;
+use crate::statistics::Estimate;
 use serde_json::json;
 
 const QUERY: &[&str] = &["query_ns"];
@@ -395,4 +397,35 @@ fn facts_of_machine_and_build_that_differ_are_named() {
     let found = settings(&old, &new);
     let found: Vec<_> = found.iter().map(|s| (s.what, s.is_machine)).collect();
     assert_eq!(found, [("cpu", true), ("flags", false), ("threads", false)]);
+}
+
+#[test]
+fn another_answer_is_told_and_its_work_is_judged() {
+    let with_work = |count: f64, nodes: f64, answers: &str| {
+        let mut all = all(10, 1.0);
+        for cell in &mut all.cells {
+            let metric = |value: f64| Metric::of(Estimate::exact(value), "");
+            cell.metrics
+                .insert("visible_count".to_owned(), metric(count));
+            cell.metrics
+                .insert("nodes_tested".to_owned(), metric(nodes));
+            cell.answers = Some(answers.to_owned());
+        }
+        all.cells
+    };
+    let old = with_work(9.0, 10.0, "a");
+    for (count, answers) in [(9.0, "b"), (9.5, "b")] {
+        let new = with_work(count, 30.0, answers);
+        for basis in [Basis::Reports, Basis::Pairs] {
+            let found = changes(basis, [&old, &new], 0.05, &["nodes_tested"]);
+            assert_eq!(found.count(Outcome::MoreWork), 5);
+            assert_eq!(found.count(Outcome::Different), 5);
+            // Two programs may round planes differently; two reports are of one program.
+            let found = changes(basis, [&old, &new], 0.05, QUERY);
+            assert_eq!(found.count(Outcome::Different), 5);
+            assert_eq!(found.judges_nothing(), basis == Basis::Reports);
+        }
+    }
+    let found = changes(Basis::Reports, [&old, &old], 0.05, QUERY);
+    assert_eq!(found.count(Outcome::Different), 0);
 }
