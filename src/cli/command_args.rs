@@ -238,8 +238,7 @@ pub struct CompareArgs {
     /// Measure of a regression
     #[arg(long, value_enum, default_value = "time")]
     pub gate: Gate,
-    /// Exit with 3 as well where a cell is inconclusive or different, or where all together
-    /// changed
+    /// Exit with 3 also if a cell is inconclusive or different, or if all changed
     #[arg(long)]
     pub fail_inconclusive: bool,
     /// Show unchanged cells and every column as well

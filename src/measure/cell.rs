@@ -48,7 +48,7 @@ pub struct ReportCell {
     pub metrics: BTreeMap<String, Metric>,
     /// Errors of the answers against the exact truth; null where nothing was answered.
     pub error: Option<Judged>,
-    /// Digest of the ids that all its frustum queries returned; absent if they are not right.
+    /// Digest of the ids returned to all frustum queries; absent if wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answers: Option<String>,
     /// Metrics that were not measured of an ok cell, each with its reason.

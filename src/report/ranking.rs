@@ -198,7 +198,7 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     items.or(count).or(cameras)
 }
 
-/// The reason why right answers to one question are not the same sets; `None` if they are.
+/// The reason why two right answers are not the same sets; `None` if they are.
 pub fn answered_otherwise((old, new): Pair) -> Option<String> {
     let counts = old.value("visible_count").zip(new.value("visible_count"));
     if let Some((was, is)) = counts.filter(|(was, is)| was != is) {

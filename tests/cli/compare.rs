@@ -387,7 +387,8 @@ fn another_question_is_not_judged_by_its_time() {
         assert!(last_line(&text).contains("9 same of 10 cells"), "{text}");
         // All of them: nothing is left that could say "no regression".
         let all = with_change(|new| cells(new).iter_mut().for_each(change));
-        let wanted = format!("nothing can be judged | 10 with another question or answer | {reason}");
+        let wanted =
+            format!("nothing can be judged | 10 with another question or answer | {reason}");
         all_refused(&all, &[COMPARE], &wanted);
     }
     // An older report does not know its cameras.
