@@ -259,7 +259,7 @@ fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]
     }
     let old = read_report(&file)?.run;
     let newest = newest_run(|path| {
-        let run = read_report(&path.join("report.json")).ok()?.run;
+        let run = read_report(path).ok()?.run;
         // A baseline may be named `report`.
         let is_run = path != Path::new(BASELINES);
         Some(run).filter(|run| is_run && run.id != old.id && run.started_at >= old.started_at)

@@ -155,10 +155,13 @@ type Logs = [Vec<f64>; 2];
 /// this; a median of the times as they are is one structure's, and another's as
 /// soon as one of them has moved past it.
 fn centred(logs: &Logs) -> Logs {
-    let old = &logs[0];
-    let mean = trimmed_mean(old).map(|found| found.mean);
-    let mean = mean.or_else(|| median(old)).unwrap_or_default();
-    [0, 1].map(|side| logs[side].iter().map(|ln| ln - mean).collect())
+    let old = mean(&logs[0]);
+    [0, 1].map(|side| logs[side].iter().map(|ln| ln - old).collect())
+}
+
+fn mean(logs: &[f64]) -> f64 {
+    let mean = trimmed_mean(logs).map(|found| found.mean);
+    mean.or_else(|| median(logs)).unwrap_or_default()
 }
 
 /// Only what is above zero is a time.
@@ -338,7 +341,7 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
     (!whys.is_empty()).then(|| whys.join(", "))
 }
 
-/// Medians over the groups of their medians over the structures, per process.
+/// Medians over the groups of their medians over the structures.
 ///
 /// Then the groups that moved relative to it. Nothing without a cell that both have timed.
 fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<CommonShift> {
@@ -355,9 +358,19 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
     let whole = groups.iter();
     let whole = whole.map(|(key, cells)| (key, Vec::from_iter(cells.iter().filter(is_whole))));
     let whole: Vec<(&GroupKey, Vec<&Logs>)> = whole.filter(|group| !group.1.is_empty()).collect();
+    // Means and what processes add to them apart: once some have moved, the median of all in a
+    // process is an upper or lower one of the others.
     let middle = |cells: &[&Logs]| {
         [0, 1].map(|side| {
-            let process = |process| median(&Vec::from_iter(cells.iter().map(|c| c[side][process])));
+            let means = Vec::from_iter(cells.iter().map(|c| mean(&c[side])));
+            let shift = median(&means).unwrap_or_default();
+            let process = |process| {
+                let own = cells
+                    .iter()
+                    .zip(&means)
+                    .map(|(c, mean)| c[side][process] - mean);
+                Some(shift + median(&Vec::from_iter(own))?)
+            };
             (0..counts[side]).filter_map(process).collect()
         })
     };

@@ -212,6 +212,9 @@ fn a_saved_run_is_the_baseline_of_the_newest() {
     works(path, &format!("{RUN} --out results/try-2"));
     let newer = read("results/try-2/report.json")["run"]["id"].clone();
     assert_eq!(id("compare --baseline main.json"), newer);
+    // Killed before its report was written, it is the newest still.
+    fs::remove_file(path.join("results/try-2/report.json")).expect("removable");
+    assert_eq!(id("compare --baseline main"), newer);
     // Again: the newer one stays.
     works(path, &format!("{RUN} --save main.json --out third"));
     assert_eq!(

@@ -429,3 +429,24 @@ fn another_answer_is_told_and_its_work_is_judged() {
     let found = changes(Basis::Reports, [&old, &old], 0.05, QUERY);
     assert_eq!(found.count(Outcome::Different), 0);
 }
+
+#[test]
+fn a_common_shift_is_none_of_a_few_structures() {
+    let restless = |slower: &[&str]| {
+        let mut all = all(10, 1.0);
+        for (i, cell) in all.cells.iter_mut().enumerate() {
+            let by = f64::from(1 + 2 * u8::from(slower.contains(&cell.structure.as_str())));
+            let times = cell.times.by_process.get_mut("query_ns").unwrap();
+            for (process, ns) in times.iter_mut().enumerate() {
+                *ns *= by * (0.3 * ((7 * i + 3 * process) as f64).sin()).exp();
+            }
+        }
+        all.cells
+    };
+    for slower in [&["a", "e"][..], &["b"], &["c", "d"]] {
+        let sides = [restless(&[]), restless(slower)];
+        let found = changes(Basis::Reports, [&sides[0], &sides[1]], 0.05, QUERY);
+        let ratio = found.common_shifts[0].ratio;
+        assert!((ratio - 1.0).abs() < 1e-6, "{slower:?}: {ratio}");
+    }
+}
