@@ -1,6 +1,6 @@
-//! The level stage, the lecture's user selection.
+//! Level stage: selection of one map by the user.
 //!
-//! Only the chosen one of the maps in a file is loaded at all.
+//! Loads only the selected map of a file.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,22 +10,23 @@ use serde::Serialize;
 use crate::input::{InputError, is_readable, read_file, unheard};
 use crate::scene::{ItemKind, LoadOptions, Sample, Scene, part_names, read_bytes, split_part};
 
-/// The level stage.
+/// Counts of the level stage.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Level {
-    /// Maps of the file; 1 for a file without maps.
+    /// Number of maps in the file; 1 for a file without maps.
     pub map_count: usize,
     /// The selected map.
     pub selected: String,
-    /// Items of all maps.
+    /// Number of items in all maps.
     pub input_count: usize,
-    /// Items of the selected map.
+    /// Number of items in the selected map.
     pub output_count: usize,
 }
 
 impl Level {
-    /// The level that a scene was loaded from, by its source as typed. Maps that
-    /// cannot be decoded were not selected and are left out.
+    /// The level that a scene was loaded from, by its source as typed.
+    ///
+    /// Maps that cannot be decoded are not counted.
     ///
     /// # Errors
     /// The file cannot be read again.
@@ -43,7 +44,7 @@ impl Level {
             (false, Some(sample)) => sample.bytes.into(),
             (false, None) => return Ok(alone),
         };
-        // Meshes and boxes that lie in the same archive are no maps.
+        // Meshes and boxes in the same archive are not maps.
         let is_map = |name: &String| {
             let end = Path::new(name).extension();
             end.is_none_or(|end| end.eq_ignore_ascii_case("bsp") || end.eq_ignore_ascii_case("wad"))
@@ -57,7 +58,7 @@ impl Level {
             return Ok(alone);
         };
         let selected = maps.remove(own);
-        // Notes on maps that were not selected are of no interest.
+        // Notes on maps that were not selected are dropped.
         let items_of = |name: String| {
             let read = || read_bytes(&bytes, [file, &name], Some(&name), options).ok();
             let mut map = unheard(read)?;
@@ -81,7 +82,7 @@ mod tests {
     use super::*;
     use crate::scene;
 
-    /// Maps in one file: the samples and their directories joined.
+    /// One file with the given sample maps, their directories joined.
     fn joined(samples: &[&str]) -> Vec<u8> {
         let maps = samples
             .iter()
@@ -106,7 +107,7 @@ mod tests {
         joined
     }
 
-    /// Such a file in a folder, as it is typed.
+    /// Writes such a file to a folder; returns its path as typed.
     fn written(folder: &Path, samples: &[&str]) -> String {
         let file = folder.join("several.wad");
         std::fs::write(&file, joined(samples)).expect("written");
@@ -160,7 +161,7 @@ mod tests {
         refused(&two, &wanted);
         let wanted = ["'map7' among MAP12, MAP20; expected"];
         refused(&format!("{two}#map7"), &wanted);
-        // Of maps of one name the last is the one that there is.
+        // Among maps of one name only the last counts.
         let many = ["freedm-map20", "freedm-map12"].repeat(6);
         let many = written(folder.path(), &many);
         refused(&many, &["2 maps, MAP20, MAP12;"]);
@@ -203,7 +204,7 @@ mod tests {
             let (of_map, items) = level("maps/b.bsp").expect("a level");
             assert_eq!((of_map.map_count, of_map.output_count), (2, items));
             assert_eq!(of_map.input_count, 2 * items);
-            // What is no map is not counted.
+            // A file that is not a map is not counted.
             if let Ok((of_mesh, items)) = level("beside.obj") {
                 assert_eq!((of_mesh.map_count, of_mesh.input_count), (1, items));
             }

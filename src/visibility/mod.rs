@@ -1,7 +1,7 @@
-//! The stages of visibility, and picking.
+//! Stages of visibility, and picking.
 //!
-//! Level, region, object, occlusion, triangle and fragment: one folder per stage, one file per
-//! back end; the object stage is [`crate::index`]. All are compared with the exact answers of
+//! Level, region, object, occlusion, triangle and fragment: one folder per stage, one file per back
+//! end; the object stage is [`crate::index`]. Tests compare all of them with the exact answers of
 //! `truth`. Nothing here is timed or printed.
 
 pub mod fragment;
@@ -27,23 +27,23 @@ pub use solids::Solids;
 mod tests_extremes;
 
 named! {
-    /// Guarantee that a back end declares of its answers and that tests check.
+    /// Guarantee that a back end declares for its answers; tests check it.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug, Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Guarantee {
-        /// The visible set itself.
+        /// Exactly the visible set.
         Exact = "exact",
-        /// A superset of the items that are visible along any ray.
+        /// A superset of the items visible along any ray.
         Conservative = "conservative",
-        /// The set that the rays of a sample grid see.
+        /// Exactly the set visible along the rays of a sample grid.
         SampleExact = "sample-exact",
-        /// Nothing: visible items may be missing.
+        /// None: visible items may be missing.
         #[default]
         Unproven = "unproven",
     }
 }
 
-/// A row of a stage's table of back ends.
+/// Row of a stage's table of back ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<B> {
     /// Name on the command line and in tables, unique in the table.
@@ -52,6 +52,6 @@ pub struct Row<B> {
     pub summary: &'static str,
     /// Guarantee of its answers.
     pub guarantee: Guarantee,
-    /// Function that builds it, or tells whether a scene has what it needs.
+    /// Function that builds it, or that tests whether a scene has what it needs.
     pub build: B,
 }

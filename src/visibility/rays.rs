@@ -1,7 +1,7 @@
-//! Rays of a camera, one per sample of an image.
+//! Camera rays, one per sample of an image.
 //!
-//! Direction and origin of a ray are f64, rounded once and exact from there on, so that
-//! every back end and the truth test the same line.
+//! Direction and origin of a ray are f64, rounded once and exact from then on, so that every back
+//! end and the truth test the same line.
 
 use std::cmp::Ordering;
 use std::fmt::Debug;
@@ -31,22 +31,23 @@ impl SampleGrid {
     }
 }
 
-/// A half-line `origin + t * direction`. `t` is the depth: direction has length 1
-/// along the axis of view (to rounding), not length 1.
+/// Half-line `origin + t * direction`; `t` is the depth.
+///
+/// The direction has length 1 along the axis of view (up to rounding), so it is not a unit vector.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Ray {
-    /// World coordinates; the eye, but for an orthographic lens.
+    /// World coordinates; the eye, except for an orthographic lens.
     pub origin: DVec3,
     /// Per unit of depth.
     pub direction: DVec3,
-    /// Least depth that is visible; what is nearer hides nothing.
+    /// Least visible depth; nearer surfaces hide nothing.
     pub near: f64,
-    /// Largest depth that is visible, `f64::INFINITY` without a far plane.
+    /// Largest visible depth; `f64::INFINITY` without a far plane.
     pub far: f64,
 }
 
 impl Ray {
-    /// The point at a depth, rounded.
+    /// Point at a depth, rounded.
     pub fn at(&self, depth: f64) -> DVec3 {
         self.origin + self.direction * depth
     }
@@ -55,27 +56,28 @@ impl Ray {
 /// All rays of a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
-    /// The camera that they are of, with an eye and a lens.
+    /// Camera of the rays, with an eye and a lens.
     pub camera: Camera,
-    /// Left, right, bottom and top of the image.
+    /// Left, right, bottom and top edge of the image.
     ///
-    /// Slopes per unit of depth, or offsets of an orthographic lens, world units.
+    /// Slopes per unit of depth; for an orthographic lens offsets in world units.
     pub window: [f64; 4],
 }
 
 impl Rays {
-    /// The rays of a camera; a matrix is unprojected.
+    /// Rays of a camera; a matrix is unprojected first.
     ///
     /// # Errors
-    /// Those of [`Camera::unprojected`].
+    /// The errors of [`Camera::unprojected`].
     pub fn of(camera: &Camera) -> Result<Rays, CameraError> {
         let camera = camera.unprojected()?;
         let window = camera.lens.window();
         Ok(Rays { camera, window })
     }
 
-    /// The ray through a place in the image: (0, 0) is its upper left corner,
-    /// (1, 1) its lower right one.
+    /// The ray through a point of the image.
+    ///
+    /// (0, 0) is the upper left corner, (1, 1) the lower right one.
     pub fn through(&self, x: f64, y: f64) -> Ray {
         let [left, right, bottom, top] = self.window;
         let across = left + (right - left) * x;
@@ -95,21 +97,20 @@ impl Rays {
         }
     }
 
-    /// The corners of the image at the near plane.
+    /// Corners of the image on the near plane.
     pub fn near_corners(&self) -> [DVec3; 4] {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         corners.map(|[x, y]| self.through(x, y).at(self.camera.lens.near()))
     }
 
-    /// The rays of all samples, row by row.
+    /// Rays of all samples, row by row.
     pub fn of_grid(&self, grid: SampleGrid) -> impl Iterator<Item = Ray> {
         let rows = 0..grid.height;
         let places = rows.flat_map(move |row| (0..grid.width).map(move |column| (column, row)));
         places.map(move |(column, row)| self.sample(grid, column, row))
     }
 
-    /// The ray of a sample: the centre of a pixel, column from the left and row
-    /// from the top.
+    /// Ray through a pixel's centre: column from the left, row from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {
         let at = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count);
         self.through(at(column, grid.width), at(row, grid.height))
@@ -121,7 +122,7 @@ pub trait Along: Copy {
     /// A point of the ray on the surface of a body.
     type At: Copy + Debug;
 
-    /// Exact order of two such points along the ray.
+    /// Compares the depths of two such points along the ray, exactly.
     fn compare(&self, a: &Self::At, b: &Self::At) -> Ordering;
 
     /// Upper bound of the true depth of a point.
@@ -135,7 +136,7 @@ pub mod tests {
 
     /// Position of a point in the image, across and down, rounded; `None` outside.
     ///
-    /// The ray [`through`](Rays::through) the position leads to the point.
+    /// The ray [`through`](Rays::through) this position leads to the point.
     pub fn in_image(rays: &Rays, point: DVec3) -> Option<[f64; 2]> {
         let frame = &rays.camera.frame;
         let about = point - frame.eye;

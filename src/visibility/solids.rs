@@ -1,9 +1,8 @@
-//! A box scene as solids: each item hides what is behind its box, exactly.
+//! Box scene as solids: each item hides what is behind its box, exactly.
 //!
-//! A ray meets a solid where it enters the solid, if that is between near and far. A ray
-//! that enters before the near plane (or begins inside) does not meet the solid: only the
-//! inside is visible from there, which, as the back of any closed surface, is not drawn
-//! and hides nothing.
+//! A ray meets a solid where it enters the solid, if that point is between near and far. A ray that
+//! enters before the near plane, or starts inside, does not meet the solid: from there only the
+//! inside is visible, which, like any back face, is not drawn and hides nothing.
 
 use glam::DVec3;
 
@@ -13,21 +12,21 @@ use crate::scene::{Scene, WorldBox};
 /// The items of a scene as solid boxes, in three forms.
 #[derive(Clone, Debug)]
 pub struct Solids {
-    /// World position of the zero of `outer` and `inner`.
+    /// World position of the origin of `outer` and `inner`.
     pub origin: DVec3,
-    /// The boxes as written: the truth.
+    /// Boxes as written in the scene: the truth.
     pub boxes: Vec<WorldBox>,
-    /// The smallest f32 boxes that hold them: what may be hidden.
+    /// Smallest enclosing f32 boxes, tested for being hidden.
     pub outer: Vec<Aabb>,
-    /// The largest f32 boxes within them, empty where there is none: what may hide.
+    /// Largest enclosed f32 boxes, which act as occluders; empty if there is none.
     pub inner: Vec<Aabb>,
 }
 
 impl Solids {
-    /// Boxes of all items of a scene, for any shape of the items. O(n).
+    /// Boxes of all items of a scene, for items of any shape. O(n).
     pub fn of(scene: &Scene) -> Solids {
         let boxes: Vec<WorldBox> = scene.written().collect();
-        // Outward, of what is inside out.
+        // Rounding an inside-out box outward rounds the box inward.
         let turned = |b: &WorldBox| Aabb::rounded_outward(b.max, b.min, scene.origin);
         let inner = boxes.iter().map(turned).map(|b| Aabb::new(b.max, b.min));
         Solids {

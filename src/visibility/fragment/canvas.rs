@@ -1,4 +1,4 @@
-//! Samples of an image: their rays, rectangles of bodies, and the stencil-test.
+//! Samples of an image: rays, screen rectangles of bodies, and the stencil test.
 
 use std::ops::Range;
 
@@ -9,57 +9,62 @@ use crate::scene::WorldBox;
 use crate::visibility::truth::{Body, SolidBox};
 use crate::visibility::{Rays, SampleGrid};
 
-/// Columns and rows of samples.
+/// Range of columns and rows of samples.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Rectangle {
-    /// From the left.
+    /// Columns, counted from the left.
     pub columns: Range<u32>,
-    /// From the top.
+    /// Rows, counted from the top.
     pub rows: Range<u32>,
 }
 
 impl Rectangle {
-    /// How many samples it holds.
+    /// Number of samples in the rectangle.
     pub fn samples(&self) -> u64 {
         self.columns.len() as u64 * self.rows.len() as u64
     }
 }
 
-/// Part of a corner's distance that the slope of its line of sight is widened by.
-/// With u = 2^-53 and D the sum of the components of `corner - eye`, the difference
-/// is true to u D, each product of three terms to 4 u D, so a slope `s = x / w` to
-/// 9 u (1 + |s|) D / w. This is 512 u.
+/// Widening of a corner's projected slope, relative to the corner's distance.
+///
+/// Let u = 2^-53 and D the sum of the absolute components of `corner - eye`. The difference is
+/// accurate to u D and each dot product to 4 u D, so a slope `s = x / w` is accurate to 9 u (1 +
+/// |s|) D / w. The constant is 512 u.
 const ROUNDED: f64 = 1.0 / (1u64 << 44) as f64;
 
-/// The same where an edge was cut at the near plane: its ends differ in depth by at
-/// least [`LEVEL`] D, so the place of the cut is true to 2^20 * 16 u of D.
+/// Widening where an edge is clipped at the near plane, relative to D.
+///
+/// The edge's ends differ in depth by at least [`LEVEL`] D, so the clip point is accurate to 2^20 *
+/// 16 u D. The constant is twice that.
 const CUT: f64 = 1.0 / (1u64 << 28) as f64;
 
-/// An edge that crosses the near plane with less difference than this part of D is
-/// not cut: its box is taken to cover everything.
+/// Least depth difference of a clipped edge, relative to D.
+///
+/// An edge that crosses the near plane with a smaller difference is not clipped: its body gets the
+/// whole image.
 const LEVEL: f64 = 1.0 / (1u64 << 20) as f64;
 
-/// Upper bound of the errors of rays and axes of a camera, in slopes.
+/// Upper bound of the rounding errors of a camera's rays and axes, as slopes.
 const AXES: f64 = 1e-12;
 
-/// A camera's image, ready to place boxes in it.
+/// A camera's image plane, onto which bodies are projected.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    /// Columns and rows.
+    /// Sample grid of the image.
     pub grid: SampleGrid,
     window: [f64; 4],
     eye: DVec3,
     axes: [DVec3; 3],
-    /// Least depth that is drawn; just before the near plane.
+    /// Least depth that is drawn, slightly before the near plane.
     near: f64,
     far: f64,
     parallel: bool,
-    /// Rounding of the origins of parallel rays, which are in world coordinates.
+    /// Rounding error of the origins of parallel rays, which are world coordinates.
     off: f64,
 }
 
 impl Screen {
-    /// The image of a camera.
+    /// Image plane of a camera.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Screen {
         let camera = &rays.camera;
         let (frame, lens) = (&camera.frame, &camera.lens);
@@ -79,8 +84,9 @@ impl Screen {
         }
     }
 
-    /// A rectangle that holds every sample whose ray meets the box; `None` if there
-    /// is none for certain.
+    /// Screen rectangle with every sample whose ray meets the box.
+    ///
+    /// Conservative; `None` if certainly no ray meets the box.
     pub fn rectangle(&self, b: &WorldBox) -> Option<Rectangle> {
         let mut corners = [[0.0; 4]; 8];
         for (i, corner) in corners.iter_mut().enumerate() {
@@ -90,32 +96,33 @@ impl Screen {
         self.hull(&corners, |from, to| (from ^ to).is_power_of_two())
     }
 
-    /// The same of a triangle; its corners are about an origin.
+    /// Screen rectangle of a triangle whose corners are relative to `origin`.
     pub fn triangle(&self, corners: [Vec3; 3], origin: DVec3) -> Option<Rectangle> {
         let shift = origin - self.eye;
         let mut placed = [[0.0; 4]; 3];
         for (corner, placed) in corners.iter().zip(&mut placed) {
             let corner = corner.as_dvec3();
-            // One rounding of the shift and one of the sum.
+            // The shift and the sum round once each.
             let off = 2.0 * f64::EPSILON * (corner.abs() + shift.abs()).element_sum();
             *placed = self.place(corner + shift, off);
         }
         self.hull(&placed, |from, to| from != to)
     }
 
-    /// A point about the eye: across, up, depth, and the size that its errors are
-    /// relative to, where the point itself may be `off`.
+    /// Projects a point relative to the eye to `[across, up, depth, size]`.
+    ///
+    /// Errors are relative to `size`. The point itself may be wrong by `off`.
     #[inline]
     fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
-        // The depth of a point too far to be resolved is off too.
+        // `off` is an error of the depth as well.
         let size = at.abs().element_sum() + (off + self.off) / ROUNDED;
         [x, y, w, size]
     }
 
-    /// A rectangle that holds the convex hull of some corners.
+    /// Screen rectangle of the convex hull of some corners.
     ///
-    /// `is_edge` is true for any two corners between which the hull has an edge.
+    /// `is_edge` returns true for two corners if the hull has an edge between them.
     fn hull<const N: usize>(
         &self,
         corners: &[[f64; 4]; N],
@@ -147,7 +154,7 @@ impl Screen {
                 add([x / w, y / w], size / w * ROUNDED + AXES);
                 continue;
             }
-            // Perhaps in front of the near plane, at a place that rounding hides.
+            // Rounding hides on which side of the near plane the corner lies.
             if w + size * ROUNDED >= self.near {
                 return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
             }
@@ -173,7 +180,7 @@ impl Screen {
             let n = f64::from(count);
             let at = |slope: f64| (slope - from) / (to - from) * n - 0.5;
             let (a, b) = (at(low), at(high));
-            // A pixel's thousandth for the rounding of this and of the rays.
+            // A thousandth of a pixel covers the rounding of this formula and of the rays.
             let first = (a.min(b) - 1e-3).ceil().clamp(0.0, n) as u32;
             let last = (a.max(b) + 1e-3).floor().clamp(-1.0, n - 1.0) + 1.0;
             first..last as u32
@@ -185,31 +192,30 @@ impl Screen {
     }
 }
 
-/// Some of the samples of an image.
+/// Stencil: the samples that may be drawn.
 #[derive(Clone, Debug)]
 pub struct Stencil {
-    /// `true` for a sample that may be drawn on.
+    /// `true` for each sample that may be drawn.
     pub marked: Vec<bool>,
-    /// Number of samples whose rays were tested to mark it.
+    /// Number of samples whose rays were tested to make the stencil.
     pub tested: u64,
 }
 
-/// The samples of an image with their rays.
+/// Samples of an image with their rays.
 ///
 /// 88 bytes per sample for boxes, 128 for triangles.
 #[derive(Clone, Debug)]
 pub struct Canvas<B: Body = SolidBox> {
-    /// The image, in which boxes and triangles can be placed.
+    /// Image plane, onto which boxes and triangles are projected.
     pub screen: Screen,
-    /// Zero of the bodies' local coordinates.
+    /// Origin of the bodies' local coordinates.
     pub(super) origin: DVec3,
     /// The ray of each sample.
     pub(super) probes: Vec<B::Probe>,
 }
 
 impl<B: Body> Canvas<B> {
-    /// The rays of a camera through the samples of a grid, for bodies relative to an
-    /// origin.
+    /// Canvas of a camera's image, for bodies relative to `origin`.
     pub fn about(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Canvas<B> {
         let mut canvas = Canvas {
             screen: Screen::of(rays, grid),
@@ -220,7 +226,7 @@ impl<B: Body> Canvas<B> {
         canvas
     }
 
-    /// Takes the samples of another camera, in the same memory.
+    /// Replaces the rays by those of another camera, in the same memory.
     pub fn turn_to(&mut self, rays: &Rays) {
         let grid = self.screen.grid;
         self.screen = Screen::of(rays, grid);
@@ -231,7 +237,7 @@ impl<B: Body> Canvas<B> {
 
     /// Calls `visit` with each sample of a rectangle that the stencil lets through.
     ///
-    /// Returns how many these are, and how many the stencil kept out.
+    /// Returns the numbers of samples that pass the stencil and that it rejects.
     pub(super) fn scan(
         &self,
         rectangle: Option<Rectangle>,

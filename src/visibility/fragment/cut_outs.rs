@@ -1,6 +1,6 @@
-//! Cut-outs: surfaces with holes, as textures with an alpha-test have them.
+//! Cut-outs: surfaces with holes, like alpha-tested textures.
 //!
-//! A mask is a pure function of a place on a face; it needs no texture.
+//! A mask is a pure function of a position on a face and needs no texture.
 
 use serde::Serialize;
 
@@ -21,8 +21,9 @@ named! {
 }
 
 impl Mask {
-    /// Tests whether the surface is opaque at a place, in tiles: the pattern of a fence
-    /// repeats with each, that of foliage never.
+    /// Tests whether the surface is opaque at (`u`, `v`), in tiles.
+    ///
+    /// The fence pattern repeats in every tile; the foliage pattern does not repeat.
     pub fn opaque(self, u: f64, v: f64) -> bool {
         match self {
             Mask::Fence => {
@@ -32,7 +33,7 @@ impl Mask {
             }
             Mask::Foliage => {
                 let cell = |x: f64| (x * 8.0).floor() as i64 as u64;
-                // The constant that the hash adds first.
+                // First constant of the hash.
                 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
                 let key = cell(u).wrapping_mul(STEP) ^ cell(v).rotate_left(32);
                 mix64(key.wrapping_sub(STEP)) % 10 < 6
@@ -44,7 +45,7 @@ impl Mask {
 /// A mask and the size of its tiles.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Surface {
-    /// Its opaque parts.
+    /// Pattern of its opaque parts.
     pub mask: Mask,
     /// Edge length of a tile, world units; above 0.
     pub tile: f64,
@@ -58,9 +59,10 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// Tests whether an item is opaque where a ray enters it. The place on the face is
-    /// that of the rounded depth, counted from the box's lower corner along the
-    /// two axes of the face, in the order x, y, z.
+    /// Tests whether an item is opaque where a ray enters its box.
+    ///
+    /// The position on the face is computed at the rounded depth, relative to the box's lower
+    /// corner, along the face's two axes in the order x, y, z.
     pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
         let Some(Some(surface)) = self.of_item.get(item as usize) else {
             return true;
@@ -78,7 +80,7 @@ impl Holes {
 /// A seeded share of the items of a scene, cut out by one mask.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct CutOuts {
-    /// Pattern of their opaque parts.
+    /// Pattern of the opaque parts.
     pub mask: Mask,
     /// Share of the items that may be cut out, in (0, 1].
     pub share: f64,
@@ -113,9 +115,9 @@ impl CutOuts {
         Ok(cut_outs)
     }
 
-    /// The cut-outs among `items`, drawn from those that `may_be`.
+    /// Chooses cut-outs at random among the `items` that satisfy `may_be`.
     ///
-    /// They are the same items whatever the mask.
+    /// The choice does not depend on the mask.
     pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
         let mut rng = SeededRng::new(self.seed);
         let CutOuts { mask, tile, .. } = *self;
@@ -170,7 +172,7 @@ mod tests {
             surfaces.of_item[3] = Some(Surface { mask, tile });
             surfaces.opaque(3, &b, &probe, &at)
         };
-        // It enters at y = 1, z = 0: (2, 1) from the corner.
+        // The ray enters at y = 1, z = 0: (2, 1) from the corner.
         assert_eq!(opaque(2.0), Mask::Fence.opaque(1.0, 0.5));
         assert_eq!(opaque(18.0), Mask::Fence.opaque(2.0 / 18.0, 1.0 / 18.0));
         assert!(opaque(2.0) && !opaque(18.0));

@@ -1,6 +1,6 @@
-//! Drawing with fragment tests: boxes or triangles in the order of a list.
+//! Rasterization with fragment tests: boxes or triangles in list order.
 //!
-//! Counts the fragments that each test lets through.
+//! Counts the fragments that pass each test.
 
 use serde::Serialize;
 
@@ -12,18 +12,18 @@ use crate::visibility::truth::{
     Along, Body, Crossing, Facet, Meeting, Probe, SolidBox, TriangleProbe,
 };
 
-/// The fragment tests beside the z-test.
+/// Fragment tests in addition to the z-test.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Tests<'a> {
-    /// The alpha-test, by the surfaces of the items.
+    /// Alpha test, by the surfaces of the items.
     pub surfaces: Option<&'a Holes>,
-    /// The stencil-test.
+    /// Stencil test.
     pub stencil: Option<&'a Stencil>,
 }
 
 /// A body that is drawn sample by sample.
 pub trait Drawable: Body {
-    /// A rectangle that holds every sample whose ray meets the body.
+    /// Screen rectangle with every sample whose ray meets the body.
     fn rectangle(&self, canvas: &Canvas<Self>) -> Option<Rectangle>;
 
     /// Tests whether the body is opaque where a ray meets it.
@@ -50,20 +50,20 @@ impl Drawable for Facet {
     }
 }
 
-/// Counts of a drawn list; of means per view, with a fraction.
+/// Counts of a drawn list; `f64` for means per view.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize)]
 pub struct Tally<N = u64> {
-    /// Samples whose rays are tested, those that mark a stencil among them.
+    /// Samples whose rays are tested, including those that mark a stencil.
     pub asked_count: N,
-    /// Samples that the stencil excludes.
+    /// Samples that the stencil rejects.
     pub kept_out_count: N,
-    /// Fragments: samples that meet an item; of meshes and maps, a triangle.
+    /// Fragments: samples whose ray meets an item (for meshes and maps, a triangle).
     pub fragment_count: N,
-    /// Fragments that the alpha-test drops.
+    /// Fragments that the alpha test discards.
     pub clear_count: N,
-    /// Other fragments that pass the z-test when they come: shaded with early z.
+    /// Other fragments that pass the z-test when drawn: shaded with early z.
     pub shaded_count: N,
-    /// Samples that something opaque covers.
+    /// Samples covered by something opaque.
     pub covered_count: N,
 }
 
@@ -80,16 +80,16 @@ struct Fragment<At> {
 pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
     pub tally: Tally,
-    /// The exact front of each sample, of opaque items; of a tie the lowest id.
+    /// Nearest opaque item of each sample, exact; the lowest id of a tie.
     pub(super) front: Vec<Option<(B::At, ItemId)>>,
-    /// Fragments that were as near as the one in front, and lost by their id.
+    /// Fragments at the depth of the one in front whose id is higher.
     ties: Vec<Fragment<B::At>>,
-    /// Items of triangles that hide nothing and are met before the front or with it.
+    /// Items of triangles that hide nothing and lie before the front or at its depth.
     before: Vec<ItemId>,
 }
 
 impl<B: Drawable> Drawn<B> {
-    /// An empty image of this many samples.
+    /// An empty image of `samples` samples.
     pub fn new(samples: usize) -> Drawn<B> {
         Drawn {
             tally: Tally::default(),
@@ -107,9 +107,9 @@ impl<B: Drawable> Drawn<B> {
         self.before.clear();
     }
 
-    /// Draws more on the same image, each body by itself.
+    /// Draws bodies on top of the image, one by one.
     ///
-    /// Those that hide nothing come last. A fragment is a body at a sample whose ray meets
+    /// Bodies that hide nothing must come last. A fragment is a body at a sample whose ray meets
     /// it. Θ(samples of the screen rectangles).
     pub fn draw(
         &mut self,
@@ -146,8 +146,10 @@ impl<B: Drawable> Drawn<B> {
         self.tally.covered_count = self.front.iter().flatten().count() as u64;
     }
 
-    /// Draws the fragment, if it passes: its sample is empty, or holds an item that is
-    /// deeper, or as deep with a higher id. Returns whether it passed.
+    /// Applies the z-test; writes the fragment and returns true if it passes.
+    ///
+    /// It passes if the sample is empty, or holds a deeper item, or an equally deep item of higher
+    /// id.
     #[inline]
     fn test(&mut self, probe: &B::Probe, fragment: Fragment<B::At>) -> bool {
         let Fragment { sample, item, at } = fragment;
@@ -158,7 +160,7 @@ impl<B: Drawable> Drawn<B> {
                 return false;
             }
             if order.is_eq() {
-                // Triangles of one item meet.
+                // Two triangles of one item.
                 if item == other_item {
                     return false;
                 }
@@ -176,9 +178,9 @@ impl<B: Drawable> Drawn<B> {
         true
     }
 
-    /// The exact visible set of the samples, ascending.
+    /// Exact visible set of the samples, ascending.
     ///
-    /// All items that are in front anywhere, every item of a tie, and the items before them
+    /// Contains the items in front at any sample, every item of a tie, and the items before them
     /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
         let in_front = |tie: &&Fragment<B::At>| {
@@ -195,9 +197,9 @@ impl<B: Drawable> Drawn<B> {
 }
 
 impl Drawn {
-    /// Marks the samples at which a rectangle is no farther than what was drawn.
+    /// Marks the samples where a rectangle is no farther than the drawn surface.
     ///
-    /// A rectangle is a box without thickness along one axis.
+    /// A rectangle is a box of zero thickness along one axis.
     pub fn stencil(&self, canvas: &Canvas, rectangles: &[WorldBox]) -> Stencil {
         let mut marked = vec![false; canvas.screen.grid.samples()];
         let mut tested = 0;
@@ -220,7 +222,7 @@ impl Drawn {
 impl Drawn<Facet> {
     /// Empties the image and draws triangles.
     ///
-    /// The opaque ones first, then those that hide nothing, against the front.
+    /// Opaque triangles come first, then those that hide nothing.
     pub fn draw_triangles(
         &mut self,
         canvas: &Canvas<Facet>,

@@ -1,11 +1,11 @@
-//! The fragment stage: the fragments that survive at each sample.
+//! Fragment stage: the fragments that survive at each sample.
 //!
-//! Solids are drawn sample by sample with the rays of a camera, in the order of a list; the
-//! z-test keeps the nearest, the alpha-test drops the clear parts of a mask, the
-//! stencil-test restricts the samples. The cost of an order (overdraw) is counted.
+//! Draws solids sample by sample with the rays of a camera, in list order. The z-test keeps the
+//! nearest fragment, the alpha test drops the clear parts of a mask, the stencil test restricts the
+//! samples. The cost of a draw order (overdraw) is counted.
 //!
-//! A fragment is an item at a sample whose ray meets the item: where it enters it,
-//! so front faces only, as it is said where [`Solids`](super::Solids) are.
+//! A fragment is an item at a sample whose ray meets the item, at the point of entry (front faces
+//! only), as defined for [`Solids`](super::Solids).
 
 mod canvas;
 mod cut_outs;

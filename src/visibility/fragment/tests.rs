@@ -14,7 +14,7 @@ use crate::visibility::truth::{
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 impl Canvas {
-    /// The rays of a camera through the samples of a grid, for boxes.
+    /// Canvas of a camera, for boxes.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
         Canvas::about(rays, grid, DVec3::ZERO)
     }
@@ -24,7 +24,7 @@ fn all(solids: &Solids) -> Vec<SolidBox> {
     Boxes::of(solids).all
 }
 
-/// All boxes as listed, and the other way round, as items and as bodies.
+/// All boxes in list order and reversed, as items and as bodies.
 fn orders(solids: &Solids) -> [(Vec<ItemId>, Vec<SolidBox>); 2] {
     let listed = all(solids);
     let items: Vec<ItemId> = listed.iter().map(|body| body.item).collect();
@@ -35,7 +35,7 @@ fn orders(solids: &Solids) -> [(Vec<ItemId>, Vec<SolidBox>); 2] {
     })
 }
 
-/// Fragments of boxes in this order, ray by ray.
+/// Fragment counts of boxes in this order, ray by ray.
 fn tallied(rays: &Rays, grid: SampleGrid, index: &RayIndex, order: &[ItemId]) -> Tally {
     let place = |item: ItemId| order.iter().position(|&other| other == item);
     let mut tally = Tally::default();
@@ -68,7 +68,7 @@ fn draw(canvas: &Canvas, bodies: impl IntoIterator<Item = SolidBox>, tests: &Tes
     drawn
 }
 
-/// Cameras in a scene: on the ground and above it, of all lenses.
+/// Cameras on the ground and above the scene, with all lenses.
 pub fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
     let low = solids
         .boxes
@@ -87,7 +87,7 @@ pub fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
     ] {
         for (height, down) in [(low.z + (high.z - low.z) / 8.0, 0.0), (high.z + 20.0, -0.7)] {
             let at = low + (high - low) * rng.point();
-            // Towards the middle, more or less.
+            // Roughly towards the middle.
             let to = low + (high - low) * (rng.point() * 0.5 + 0.25) - at;
             let forward = DVec3::new(to.x, to.y, to.truncate().length() * down);
             let eye = DVec3::new(at.x, at.y, height);
@@ -148,7 +148,7 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
                 solids.boxes
             );
             assert_eq!(drawn.visible(&canvas), truth.visible, "{items:?}");
-            // Ray by ray the same fragments are shaded.
+            // The same fragments are shaded, ray by ray.
             let asked_count = 0;
             assert_eq!(
                 tally,

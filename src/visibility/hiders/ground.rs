@@ -1,17 +1,17 @@
-//! The ground of a mesh: boxes below it hide what is behind hills.
+//! Ground of a mesh: occluder boxes below the terrain, for what hills hide.
 //!
-//! Ground are the items of which every triangle faces up, if all of them together are
-//! a height over a rectangle: each edge is gone along once each way, but for those on
-//! the rectangle's sides, which part the sides without gaps. The sum of all triangles as
-//! seen from above then has the rectangle's border as its own, and as all turn the same
-//! way each place lies below one triangle, or below the common edge of some.
+//! An item belongs to the ground if all its triangles face up. Together these items must form a
+//! height field over a rectangle: each edge occurs once in each direction, except the edges on the
+//! rectangle's sides, which divide the sides without gaps. Seen from above, the triangles then have
+//! the rectangle's border as their boundary, and as all have the same orientation, each point of
+//! the rectangle lies below one triangle or below an edge that triangles share.
 //!
-//! A box whose top is nowhere above that height hides what is behind it from whatever
-//! begins above it: a ray that enters the box has come down through the height before,
-//! over the rectangle all the way, so it has met a triangle from above.
+//! A box whose top is nowhere above the terrain hides what is behind it from every ray that starts
+//! above the terrain: a ray that enters the box has descended through the height field, over the
+//! rectangle all the way, so it has met the front of a triangle.
 //!
-//! Not drawn from above all of the ground, where they displace trees in the two layers of the
-//! masked buffer (mesh:forest: 110 of 1,684 items removed in place of 190).
+//! The boxes are not drawn for an eye above all of the ground: there they displace trees in the two
+//! layers of the masked buffer (mesh:forest: 110 of 1,684 items removed instead of 190).
 
 use std::collections::HashMap;
 use std::time::Instant;
@@ -24,36 +24,36 @@ use crate::scene::{Scene, SurfaceKind, UpAxis, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::inscribed::{Cells, turn};
 
-/// Cells along each side of the rectangle, and steps of height.
+/// Cells along each side of the rectangle and along the height.
 const CELLS: usize = 64;
-/// Boxes at most: each costs time in every view.
+/// Most boxes: each costs time in every view.
 const MOST_BOXES: usize = 512;
-/// Least share of the volume between lowest and highest place that a box adds.
+/// Least volume that a box adds, relative to the terrain's bounding box.
 const LEAST_GAIN: f64 = 1.0 / 16384.0;
 
-/// The boxes below the ground of a mesh.
+/// Counts of the occluder boxes below the ground of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GroundRow {
     /// Items that are ground.
     pub item_count: usize,
-    /// How many boxes there are below it.
+    /// Number of boxes below the ground.
     pub box_count: usize,
     /// Volume of the boxes / volume below the ground; null for flat ground.
     ///
-    /// Both are above its lowest place. Flat ground hides nothing.
+    /// Both volumes are measured from the lowest point of the ground. Flat ground hides nothing.
     pub volume_share: Option<f64>,
-    /// Wall time of finding them all.
+    /// Wall time of finding all boxes.
     pub build_ns: f64,
 }
 
 /// The ground and the boxes below it, scene-local.
 pub struct Ground {
-    /// Overlapping; all of them reach below whatever else there is.
+    /// Overlapping boxes that reach below everything else in the scene.
     pub boxes: Vec<Aabb>,
-    /// Their number and share.
+    /// Counts of the boxes.
     pub row: GroundRow,
     up: UpAxis,
-    /// Turned so that z is up, and so is all that follows.
+    /// Triangles rotated to z up, like the fields below.
     triangles: Vec<[Vec3; 3]>,
     /// Bounds of all triangles.
     bounds: Aabb,
@@ -61,7 +61,7 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// `None` for a scene without one. O(t log t).
+    /// Finds the ground of a scene; `None` for a scene without ground. O(t log t).
     pub fn of(scene: &Scene) -> Option<Ground> {
         let surfaces = scene.surfaces.as_ref()?;
         let begun = Instant::now();
@@ -85,7 +85,7 @@ impl Ground {
         let [least, extent] = [scene.bounds.min, scene.bounds.extent()].map(|v| up.to_z_up(v).z);
         let bottom = least - extent - 1.0;
         let mut cells = Cells::new(CELLS, filled);
-        // All columns of cells begin at the lowest place.
+        // All boxes start at the lowest slab of cells.
         let found = std::iter::from_fn(|| cells.next_box(0..1)).take(MOST_BOXES);
         for (count, found) in found.take_while(|(count, _)| share(*count) >= LEAST_GAIN) {
             held += share(count);
@@ -109,7 +109,7 @@ impl Ground {
 
     /// Returns `true` if some of the ground is higher than the eye.
     ///
-    /// From above all of it hills hide little, and boxes all over the image displace other
+    /// From above all of the ground, hills hide little, and boxes all over the image displace other
     /// occluders.
     pub fn rises_above(&self, rays: &Rays) -> bool {
         let eye = self.up.to_z_up(rays.camera.frame.eye).z - self.origin.z;
@@ -122,7 +122,7 @@ impl Ground {
         let corners = rays.near_corners();
         let corners = corners.map(|p| WorldBox::at(self.up.to_z_up(p) - self.origin));
         let WorldBox { min, max } = WorldBox::union_of(corners);
-        // More than rounding of the corners, and of what begins at them, can be.
+        // Exceeds the rounding of the corners and of the rays that start there.
         let size = min.abs().max(max.abs()).max(self.origin.abs());
         let slack =
             1e-9 * size.max_element() + 1e-6 * (max - min).max_element() + 1e-8 * near.abs();
@@ -138,7 +138,7 @@ impl Ground {
     }
 }
 
-/// The bounds of triangles that all face up, if they are a height over a rectangle.
+/// Bounds of triangles that all face up, if they form a height field.
 fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
     let bounds = Aabb::of_points(triangles.iter().flatten().copied());
     let [low, high] = [bounds.min, bounds.max];
@@ -154,7 +154,7 @@ fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
             }
         }
     }
-    // Along each of the four sides from end to end.
+    // The border edges must cover each of the four sides from end to end.
     let mut sides: [Vec<[f32; 2]>; 4] = Default::default();
     for [p, q] in rim.into_values() {
         let side = (0..4).find(|&side| {
@@ -176,10 +176,10 @@ fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
     Some(bounds)
 }
 
-/// Columns of cells over a rectangle, filled up to the ground.
+/// Height of the terrain over each cell of a grid on the rectangle.
 struct Heights {
     bounds: Aabb,
-    /// Exact height of the lowest point over each column, by row and column.
+    /// Exact lowest height over each cell, row by row.
     least: Vec<f32>,
 }
 
@@ -202,7 +202,7 @@ impl Heights {
         heights
     }
 
-    /// Lower end of a cell along an axis; behind the last cell the bound itself.
+    /// Lower bound of a cell on an axis; after the last cell the upper bound itself.
     fn edge(&self, axis: usize, cell: usize) -> f32 {
         let (low, high) = (self.bounds.min[axis], self.bounds.max[axis]);
         match cell {
@@ -211,14 +211,14 @@ impl Heights {
         }
     }
 
-    /// The cells that have a point between two positions.
+    /// Cells that overlap the closed interval from `low` to `high`.
     fn cells(&self, axis: usize, low: f32, high: f32) -> std::ops::Range<usize> {
         let first = (0..CELLS).find(|cell| self.edge(axis, cell + 1) >= low);
         let last = (0..CELLS).rfind(|cell| self.edge(axis, *cell) <= high);
         first.unwrap_or(0)..last.map_or(CELLS, |last| last + 1)
     }
 
-    /// Rows of the cells wholly below the ground, by z and y, a bit per cell along x.
+    /// Cells entirely below the ground: rows by z and y, one bit per cell along x.
     fn filled(&self) -> Vec<u64> {
         let (low, high) = (self.bounds.min.z, self.bounds.max.z);
         let step = (high - low) / CELLS as f32;
@@ -233,7 +233,7 @@ impl Heights {
         filled
     }
 
-    /// The box over some columns, from `bottom` up to the lowest point over them.
+    /// Box over a block of cells, from `bottom` up to the lowest height over them.
     fn to_box(&self, [low, high]: [[usize; 3]; 2], bottom: f32) -> Aabb {
         let rows = (low[1]..high[1]).map(|row| &self.least[row * CELLS..]);
         let least = rows.flat_map(|row| &row[low[0]..high[0]]);
@@ -254,7 +254,7 @@ mod tests {
         load("mesh:terrain:n=8000", &Default::default()).unwrap()
     }
 
-    /// All triangles of it.
+    /// Triangles of the whole terrain.
     fn triangles() -> Vec<[Vec3; 3]> {
         let surfaces = terrain().surfaces.unwrap();
         (0..surfaces.items())
@@ -262,7 +262,7 @@ mod tests {
             .collect()
     }
 
-    /// The height of the ground at a place, by a plain search.
+    /// Terrain height at a point, by linear search.
     fn height(triangles: &[[Vec3; 3]], x: f64, y: f64) -> f64 {
         let of = |t: &[Vec3; 3]| {
             let [a, b, c] = t.map(Vec3::as_dvec3);
@@ -363,7 +363,7 @@ mod tests {
         };
         assert!(of(&lower_half).is_some_and(|b| b.max.y < bounds.max.y));
         assert_eq!(height_over(&[]), None);
-        // Of a wood the ground is found among the trees, of spheres none.
+        // A forest has ground among its trees; spheres have none.
         let named = |name: &str| Ground::of(&load(name, &Default::default()).unwrap());
         let wood = named("mesh:forest:n=20k").unwrap();
         assert!(wood.row.item_count < 20 && wood.row.box_count > 20);

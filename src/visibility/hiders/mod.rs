@@ -1,7 +1,7 @@
-//! Occluders of a scene, made once before any view.
+//! Occluders of a scene, built once before any view.
 //!
-//! They are the items themselves if these are solid boxes, boxes inside the items of a mesh and
-//! below its ground, or boxes in the solid of a map.
+//! These are the items themselves if they are solid boxes, boxes inside the items of a mesh and
+//! below its ground, or boxes in the solid space of a map.
 
 mod ground;
 
@@ -25,21 +25,21 @@ pub struct Hiders {
     all: OccluderScene,
     /// Occluders that belong to items.
     ///
-    /// For eyes outside the rooms of a map or not above the ground of a mesh.
+    /// Used for eyes outside the rooms of a map or not above the ground of a mesh.
     bare: Option<OccluderScene>,
-    /// The boxes inside the items of a mesh.
+    /// Statistics of the boxes inside the items of a mesh.
     pub inner: Option<InnerRow>,
-    /// The ground of a mesh, with the boxes below it.
+    /// Ground of a mesh with the boxes below it.
     pub ground: Option<Ground>,
-    /// The boxes in the solid of a map.
+    /// Statistics of the boxes in the solid space of a map.
     pub blocks: Option<BlocksRow>,
 }
 
 impl Hiders {
-    /// The occluders of a scene.
+    /// Builds the occluders of a scene.
     ///
-    /// `solids` are its items if they are solid boxes; items of triangles get up to `most`
-    /// boxes inside.
+    /// `solids` are the items if they are solid boxes; items of triangles get up to `most` inner
+    /// boxes each.
     pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
         let inner = scene.surfaces.as_ref();
         let inner = inner.map(|surfaces| inner_boxes(surfaces, CELLS, most, threads));
@@ -62,10 +62,10 @@ impl Hiders {
         }
     }
 
-    /// Returns `true` if boxes of no item hide something from the eye of these rays.
+    /// Returns `true` if occluders that belong to no item are valid for this eye.
     ///
-    /// The eye is above the ground where it stands and not above all of it, or in the rooms of
-    /// a map.
+    /// In a mesh, the near window must be above the ground, but some ground must be higher than the
+    /// eye. In a map, the eye must be in the rooms (`is_inside`).
     pub fn is_open(&self, rays: &Rays, is_inside: impl FnOnce() -> bool) -> bool {
         match &self.ground {
             Some(ground) => ground.rises_above(rays) && ground.is_below(rays),
@@ -73,7 +73,7 @@ impl Hiders {
         }
     }
 
-    /// The occluders for an eye, [in the open](Hiders::is_open) or not.
+    /// Occluders for an eye that is [in the open](Hiders::is_open) or not.
     pub fn from_eye(&self, is_open: bool) -> &OccluderScene {
         match &self.bare {
             Some(bare) if !is_open => bare,
@@ -82,18 +82,18 @@ impl Hiders {
     }
 }
 
-/// The boxes in the solid of a map.
+/// Statistics of the boxes in the solid space of a map.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BlocksRow {
-    /// Number of boxes; none if a sector does not close.
+    /// Number of boxes; 0 if a sector is not closed.
     pub box_count: usize,
-    /// Sectors whose linedefs do not close: rays leave the map there.
+    /// Number of sectors whose linedefs are not closed: rays leave the map there.
     pub unclosed_sector_count: usize,
-    /// Wall time of finding them all.
+    /// Wall time of finding all boxes.
     pub build_ns: f64,
 }
 
-/// Boxes over the heights of a map's items, scene-local; `None` for other scenes.
+/// Solid boxes of a map over its items' heights, scene-local; else `None`.
 pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
     let map = DoomMap::of_scene(scene)?;
     let begun = Instant::now();
@@ -104,7 +104,7 @@ pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
         unclosed_sector_count: map.unclosed().len(),
         build_ns: begun.elapsed().as_nanos() as f64,
     };
-    // Whole numbers, so nothing is rounded.
+    // Integer coordinates: nothing is rounded.
     let about = |corner: DVec3| (corner - scene.origin).as_vec3();
     let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
     Some((local.collect(), row))

@@ -1,6 +1,6 @@
-//! Cells of a grid over a closed surface, and the search for boxes of them.
+//! Voxel grid over a closed surface, and a search for boxes of inner cells.
 //!
-//! Cells only propose boxes; those that are used are proven.
+//! Cells only propose boxes; every box that is used is proven.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::Aabb;
 
-/// A grid over the bounds of a closed piece of a surface.
+/// Voxel grid over the bounds of one closed component of a surface.
 pub struct Grid {
     cells: usize,
     low: DVec3,
@@ -30,8 +30,9 @@ impl Grid {
         (self.low + self.step * DVec3::new(x, y, z)).as_vec3()
     }
 
-    /// Cells that a triangle may enter: those of its bounds on both sides of its
-    /// plane, and a little more. (Only a proposal: the proof does not use it.)
+    /// Cells near a triangle: in its bounds and on both sides of its plane.
+    ///
+    /// Slightly enlarged. Only a proposal: the proof does not use it.
     fn touched(&self, part: &[[Vec3; 3]]) -> Vec<u64> {
         let n = self.cells;
         let mut touched = vec![0u64; n * n];
@@ -60,9 +61,9 @@ impl Grid {
         touched
     }
 
-    /// The cells inside the surface. O(t + cells³), and more where triangles are long.
+    /// Cells inside the surface. O(t + cells³), more for long triangles.
     ///
-    /// No path from the sides reaches them without a touched cell.
+    /// A cell is inside if every path to it from the grid's border crosses a touched cell.
     pub fn cells(&self, part: &[[Vec3; 3]]) -> Cells {
         let (n, touched) = (self.cells, self.touched(part));
         let row = u64::MAX >> (64 - n);
@@ -74,7 +75,7 @@ impl Grid {
             has_grown = false;
             for i in 0..n * n {
                 let (z, y) = (i / n, i % n);
-                // Beyond the sides all is outside.
+                // Everything beyond the grid's border is outside.
                 let row_at = |is_within: bool, at: usize| if is_within { outside[at] } else { row };
                 let above = row_at(z > 0, i.wrapping_sub(n)) | row_at(z + 1 < n, i + n);
                 let beside = row_at(y > 0, i.wrapping_sub(1)) | row_at(y + 1 < n, i + 1);
@@ -96,31 +97,31 @@ impl Grid {
     }
 }
 
-/// Cells of a cube of `n` along each axis, up to 64: those that boxes may fill.
+/// Cells of a cube with `n` (up to 64) per axis, with those that boxes may fill.
 #[derive(Clone)]
 pub struct Cells {
     n: usize,
-    /// A word per row along x, y fastest: bit `x` is a cell.
+    /// One word per row along x, y fastest; bit `x` marks an inside cell.
     inside: Vec<u64>,
-    /// Those inside that are in no box yet.
+    /// Inside cells that no box contains yet.
     open: Vec<u64>,
 }
 
-/// First cell of a box and the one behind its last, on each axis.
+/// First cell and one-past-last cell of a box, on each axis.
 pub type CellBox = [[usize; 3]; 2];
 
 impl Cells {
-    /// Cells of rows along x, by z and y; no box yet.
+    /// Inside cells given as rows along x, by z and y; no box yet.
     pub fn new(n: usize, inside: Vec<u64>) -> Cells {
         let open = inside.clone();
         Cells { n, inside, open }
     }
 
-    /// Finds the box of inside cells that holds the most that are in no box yet.
+    /// Finds the box of inside cells with the most cells that are in no box yet.
     ///
-    /// Returns the box with the number of those cells; of equal boxes the largest, so that
-    /// boxes overlap without seams. The lowest slab of z of the box is one of `lows`. `None`
-    /// if no cell is left. O(n⁴) in common cases.
+    /// Returns the number of those cells and the box; among equal boxes the largest, so that boxes
+    /// overlap without seams. The box's lowest z layer is one of `lows`. `None` if no cell is left.
+    /// O(n⁴) in common cases.
     pub fn next_box(&mut self, lows: Range<usize>) -> Option<(u32, CellBox)> {
         let n = self.n;
         let open = self.open_below();
@@ -160,7 +161,7 @@ impl Cells {
         Some((count, found))
     }
 
-    /// Sums over all open cells below each corner, x fastest.
+    /// Prefix sums of the open cells below each corner, x fastest.
     fn open_below(&self) -> Vec<u32> {
         let n = self.n;
         let side = n + 1;
@@ -190,10 +191,10 @@ impl Cells {
     }
 }
 
-/// Calls `each` with columns and rows of every rectangle of set bits of full width.
+/// Calls `each` with the columns and rows of every rectangle of set bits.
 ///
-/// For all runs of rows, the runs of columns that are set in all of them; column `k` is bit
-/// `k`. O(rows² x runs).
+/// For each range of rows: the maximal runs of columns set in all of them; column `k` is bit `k`.
+/// O(rows² x runs).
 fn rectangles(rows: &[u64], mut each: impl FnMut(Range<usize>, Range<usize>)) {
     for first in 0..rows.len() {
         let mut common = u64::MAX;

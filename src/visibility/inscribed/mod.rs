@@ -1,10 +1,8 @@
-//! Boxes within closed meshes: what a mesh hides at the least.
+//! Inner boxes: axis-aligned boxes inside closed meshes, used as occluders.
 //!
-//! A search on a grid of cells proposes boxes (`cells`); exact tests prove that no triangle
-//! enters them and that they are inside.
-//!
-//! (Inscribed boxes as occluders: Silvennoinen, Saransaari, Laine and Lehtinen 2014,
-//! "Occluder simplification using planar sections", name the voxel approach.)
+//! A search on a voxel grid proposes boxes (`cells`); exact tests prove that no triangle enters
+//! them and that they are inside. (Silvennoinen, Saransaari, Laine and Lehtinen 2014, "Occluder
+//! simplification using planar sections", name the voxel approach.)
 
 mod cells;
 
@@ -28,35 +26,36 @@ pub(crate) use super::inscribed::cells::Cells;
 /// Boxes proven to be inside an item.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Inscribed {
-    /// Scene-local, those that add most first; they overlap. The open inside of none
-    /// holds a point of the piece of the surface that it is inside of.
+    /// Scene-local and overlapping, largest gain first.
+    ///
+    /// The open interior of each box is disjoint from the surface component that it lies in.
     pub boxes: Vec<Aabb>,
-    /// Volume of the boxes over `volume`, 1 less the loss; where pieces overlap, both
-    /// count.
+    /// Volume of the boxes / `volume`; overlapping components count twice.
     pub share: f64,
-    /// Volume within the opaque triangles.
+    /// Volume enclosed by the opaque triangles.
     pub volume: f64,
 }
 
-/// Cells of the grid along each axis, by default.
+/// Default number of grid cells along each axis.
 pub const CELLS: usize = 24;
 
-/// Boxes of an item at most: each costs time in every view.
+/// Most boxes per item: each costs time in every view.
 pub const MOST_BOXES: usize = 16;
 
-/// Boxes of an item by default.
+/// Default number of boxes per item.
 pub const BOXES: usize = 8;
 
-/// Least share of the item's volume that a box adds.
+/// Least share of the item's volume that a box must add.
 const LEAST_GAIN: f64 = 1.0 / 64.0;
 
-/// How often a box shrinks when its proof fails.
+/// Number of attempts per box; it shrinks after each failed proof.
 const TRIES: usize = 4;
 
-/// Large axis-parallel boxes inside an item: of whole cells, by a grid of `cells`
-/// (4 to 64) along each axis of each of its pieces; of all these the `most` (up to
-/// [`MOST_BOXES`]) that add most. Counts opaque triangles only; `None` where
-/// these are not closed, or no box was found. O(t + cells⁴), both for each box.
+/// Finds up to `most` (at most [`MOST_BOXES`]) large boxes inside an item.
+///
+/// Each is made of whole cells of a grid with `cells` (4 to 64) per axis over a connected
+/// component; the largest gains win. Only opaque triangles count; `None` if these are not closed or
+/// no box is found. O(t + cells⁴) per box.
 pub fn inscribed_boxes(
     surfaces: &Surfaces,
     item: usize,
@@ -70,11 +69,11 @@ pub fn inscribed_boxes(
     let most = most.min(MOST_BOXES);
     let (parts, cells) = (parts(&solid), cells.clamp(4, 64));
     let volume_of = |part: &Vec<[Vec3; 3]>| volume_within(part.iter().copied());
-    // Pieces that are wound inward hold no box.
+    // Components that are wound inward hold no box.
     let inward: f64 = parts.iter().map(|part| volume_of(part).min(0.0)).sum();
     let volume = volume_within(solid.of(0)) - inward;
     let least = volume * LEAST_GAIN;
-    // A box adds no more than its piece has.
+    // A box cannot add more than the volume of its component.
     let large = |part: &&Vec<[Vec3; 3]>| volume_of(part) >= least;
     let large = parts.iter().filter(large);
     let found = large.flat_map(|part| boxes_in(part, cells, most, least));
@@ -90,12 +89,12 @@ pub fn inscribed_boxes(
     })
 }
 
-/// Boxes in a closed surface in one piece, each with the volume it adds.
+/// Boxes in one connected closed component, each with the volume it adds.
 ///
-/// Up to `most`, each of which adds at least `least`.
+/// At most `most`; each adds at least `least`.
 fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f64, Aabb)> {
     let bounds = Aabb::of_points(part.iter().flatten().copied());
-    // A box by itself, as walls and houses are.
+    // The component is itself a box, like many walls and houses.
     if is_in(part, &bounds) {
         return vec![(volume(&WorldBox::of(&bounds, DVec3::ZERO)), bounds)];
     }
@@ -123,7 +122,7 @@ fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f
     found
 }
 
-/// A box, or a smaller one about its middle, that is inside.
+/// Shrinks a box about its centre until it is proven inside; else `None`.
 fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
     for _ in 0..TRIES {
         if !tried.is_empty() && is_in(part, &tried) {
@@ -139,12 +138,12 @@ fn volume(b: &WorldBox) -> f64 {
     (b.max - b.min).element_product()
 }
 
-/// The triangles of an only item, apart where they have no point in common.
+/// Splits an only item into connected components.
 ///
-/// Pieces of a closed surface are closed, and may overlap.
+/// Components of a closed surface are closed, and may overlap.
 fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
     let triangles = &surfaces.triangles;
-    // Union and find by halving paths; the lowest point stands for its piece.
+    // Union-find with path halving; the lowest point represents its component.
     let mut parent: Vec<u32> = (0..surfaces.points.len() as u32).collect();
     fn root(parent: &mut [u32], mut at: u32) -> u32 {
         while parent[at as usize] != at {
@@ -168,29 +167,28 @@ fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
     parts.into_values().collect()
 }
 
-/// The boxes inside the items of a mesh.
+/// Statistics of the boxes inside the items of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct InnerRow {
     /// Items of the mesh.
     pub item_count: usize,
-    /// Items that have a box inside: opaque, closed, and with room for one.
+    /// Items with an inner box: opaque, closed, and large enough for one.
     pub boxed_count: usize,
-    /// Most boxes of an item.
+    /// Most boxes per item.
     pub box_limit: usize,
-    /// Number of boxes of all items.
+    /// Number of boxes in all items.
     pub box_count: usize,
     /// Volume of the boxes / volume of the items that have one; null if none has.
     ///
-    /// Pieces that overlap count twice.
+    /// Overlapping components count twice.
     pub volume_share: Option<f64>,
-    /// Wall time of finding and proving them all.
+    /// Wall time of finding and proving all boxes.
     pub build_ns: f64,
 }
 
-/// Boxes inside each item of a mesh, as [`inscribed_boxes`] finds them.
+/// Inner boxes of each item of a mesh, as found by [`inscribed_boxes`].
 ///
-/// Each box with its item, by ascending item; scene-local. The same on any number of
-/// threads.
+/// Pairs of item and box by ascending item, scene-local. Independent of the number of threads.
 pub fn inner_boxes(
     surfaces: &Surfaces,
     cells: usize,
@@ -220,29 +218,29 @@ pub fn inner_boxes(
     (boxes, row)
 }
 
-/// Returns `true` if the open box is inside a closed piece.
+/// Returns `true` if the open box is inside a closed component.
 pub fn is_in(part: &[[Vec3; 3]], inner: &Aabb) -> bool {
     let is_apart = part.iter().all(|corners| is_outside(*corners, inner));
-    // All of an open box without a surface in it is inside, or none is.
+    // No surface crosses the open box, so one point decides for all of it.
     is_apart && winding(part, inner).is_some_and(|turns| turns > 0)
 }
 
-/// Returns `true` if a triangle and an open box have no point in common, exactly.
+/// Returns `true` if a triangle and an open box are disjoint, exactly.
 ///
-/// Uses the thirteen separating axes (Akenine-Möller 2001) as comparisons and orientations.
+/// Tests the thirteen separating axes (Akenine-Möller 2001) by comparisons and orientations.
 fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
     let [p, q, r] = corners;
     let (low, high) = (p.min(q).min(r), p.max(q).max(r));
     if high.cmple(b.min).any() || low.cmpge(b.max).any() {
         return true;
     }
-    // Without area there is no plane to be behind.
+    // A triangle without area has no plane to separate by.
     let on_plane = normal(corners) != DVec3::ZERO
         && [[p, q, r], [p, r, q]]
             .into_iter()
             .any(|triangle| (0..8).all(|i| !faces(&Eye::local(b.corner(i).as_dvec3()), triangle)));
-    // Edges against the box's axes: a line of the projection along the axis that has
-    // the rectangle on one side, the triangle on the other.
+    // Edges against the box's axes: in the projection along an axis, an edge separates if the
+    // rectangle and the triangle lie on different sides of its line.
     on_plane
         || (0..3).any(|axis| {
             let flat = |v: Vec3| [v[(axis + 1) % 3], v[(axis + 2) % 3]];
@@ -255,19 +253,19 @@ fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
                     left &= side <= 0;
                     right &= side >= 0;
                 }
-                // If the projection is a line, both sides of it are free; if it
-                // is a point, there is no line.
+                // If the triangle projects to a line, either side will do; if the edge projects to
+                // a point, it has no line.
                 (left || right) && a != b0
             })
         })
 }
 
-/// The sign of the turn from `a` over `b` to `c`, exactly: 1 is to the left.
+/// Orientation of `a`, `b`, `c`, exact: 1 if they turn left, -1 right, 0 collinear.
 pub fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
     let [[ax, ay], [bx, by], [cx, cy]] = [a, b, c].map(|p| p.map(f64::from));
     let (left, right) = ((bx - ax) * (cy - ay), (by - ay) * (cx - ax));
     let side = left - right;
-    // Four roundings on each way: Shewchuk 1997 proves 3 + 16 * 2^-53 of them.
+    // Shewchuk 1997 proves an error factor of (3 + 16 * 2^-53) * 2^-53; this is 8 * 2^-53.
     if side.abs() > (left.abs() + right.abs()) * (4.0 * f64::EPSILON) {
         return if side > 0.0 { 1 } else { -1 };
     }
@@ -275,11 +273,12 @@ pub fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
     (&(&minus(bx, ax) * &minus(cy, ay)) - &(&minus(by, ay) * &minus(cx, ax))).sign()
 }
 
-/// How often a closed surface winds around a point in the box: crossings of a ray
-/// upward from it, `None` if every ray that was tried meets an edge.
+/// Winding number of a closed surface about a point in the box.
+///
+/// Counts crossings of an upward ray; `None` if each of the rays tried meets an edge.
 fn winding(part: &[[Vec3; 3]], inner: &Aabb) -> Option<i32> {
     let (low, size) = (inner.min.as_dvec3(), inner.extent().as_dvec3());
-    // Places of the plane that are unlikely to be those of corners.
+    // Positions that are unlikely to lie below a corner.
     (1..16).find_map(|k| {
         let within = |step: f64| (0.5 + f64::from(k) * step).fract() * 0.8 + 0.1;
         let at = DVec3::new(within(0.381_966), within(0.237_512), 0.5);
@@ -304,8 +303,8 @@ fn winding(part: &[[Vec3; 3]], inner: &Aabb) -> Option<i32> {
             if sides.contains(&0) {
                 return None;
             }
-            // Upward the ray leaves through a triangle that faces up, if it is above:
-            // the point then is behind it.
+            // An upward ray leaves the surface through a triangle that faces up and lies above the
+            // point: the point is then behind the triangle.
             let is_in_front = faces(&eye, [a, b, c]);
             turns += i32::from(some_left) - i32::from(is_in_front);
         }
@@ -336,7 +335,7 @@ mod tests {
         let statue = mesh("statue", 5000);
         let found = inscribed_boxes(&statue, 0, CELLS, MOST_BOXES).unwrap();
         assert!(found.share > 0.45 && found.share < 1.0, "{found:?}");
-        // Independently: from random points of the boxes the surface is all around.
+        // Independent check: from random points of the boxes the surface is all around.
         let mut rng = SeededRng::new(1);
         for place in 0..100 {
             let b = &found.boxes[place % found.boxes.len()];
@@ -347,7 +346,7 @@ mod tests {
                 .sum();
             assert!((angle / (2.0 * std::f64::consts::TAU) - 1.0).abs() < 1e-6);
         }
-        // And by points of the statue's own box, what all of them hold together.
+        // Independent check: points of the statue's own box estimate the boxes' joint volume.
         let bounds = statue.bounds(0);
         let size = bounds.max.as_dvec3() - bounds.min.as_dvec3();
         let held = (0..100_000).filter(|_| {
@@ -364,7 +363,7 @@ mod tests {
         );
         let spheres = mesh("spheres", 5 * 1280);
         for item in 0..spheres.items() {
-            // The cube in a ball has 2 / (sqrt(3) pi) = 37 % of it.
+            // The cube inscribed in a ball has 2 / (sqrt(3) pi) = 37 % of its volume.
             let found = inscribed_boxes(&spheres, item, CELLS, MOST_BOXES).unwrap();
             let whole = spheres.volume(item);
             let first = volume(&WorldBox::of(&found.boxes[0], DVec3::ZERO)) / whole;
@@ -373,7 +372,7 @@ mod tests {
         }
     }
 
-    /// Seen from the zero (van Oosterom and Strackee 1983).
+    /// Solid angle seen from the origin (van Oosterom and Strackee 1983).
     fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
         let lengths = [a, b, c].map(DVec3::length);
         let [x, y, z] = lengths;
@@ -439,7 +438,7 @@ mod tests {
         house.push_box(SurfaceKind::Opaque, false, &walls);
         let whole = inscribed_boxes(&house, 0, 8, 1);
         assert_eq!(whole.as_ref().unwrap().volume, 64.0);
-        // The first two triangles once more, of glass.
+        // Adds glass copies of the first two triangles.
         house.triangles.extend_from_within(..2);
         house.of_item[0].end += 2;
         house.kinds.extend([SurfaceKind::Clear; 2]);
@@ -456,7 +455,7 @@ mod tests {
 
     #[test]
     fn separation_is_what_clipping_says() {
-        // Cut the triangle by the six planes in f64: something left means common points.
+        // Clips the triangle by the six planes in f64: a remainder means common points.
         let unit = Aabb::new(Vec3::splat(-1.0), Vec3::ONE);
         let mut rng = SeededRng::new(4);
         let (mut apart, mut by_edge) = (0, 0);
@@ -487,7 +486,7 @@ mod tests {
             by_edge += u32::from(is_apart && bounds.intersects(&unit));
         }
         assert!(apart > 1000 && by_edge > 100, "{apart} {by_edge}");
-        // A needle without area, through the middle.
+        // A triangle without area through the middle.
         let [a, b] = [Vec3::splat(-2.0), Vec3::splat(2.0)];
         assert!(!is_outside([a, b, Vec3::ZERO], &unit) && !is_outside([a, a, b], &unit));
         assert!(is_outside(

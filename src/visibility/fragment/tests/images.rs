@@ -46,8 +46,7 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
     );
 }
 
-/// A portal in a wall: the pass beyond it draws on its samples alone, and there
-/// just what the whole view has beyond the wall.
+/// A portal pass draws only its samples, with what the full view shows there.
 #[test]
 fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     let wall = |y: [f64; 2], z: [f64; 2]| {
@@ -58,7 +57,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
         wall([1.0, 20.0], [-20.0, 20.0]),
         wall([-1.0, 1.0], [2.0, 20.0]),
         wall([-1.0, 1.0], [-20.0, 0.0]),
-        // A pillar before the portal.
+        // A pillar in front of the portal.
         WorldBox::new(DVec3::new(7.0, 0.0, 0.0), DVec3::new(7.5, 0.5, 3.0)),
     ];
     let mut rng = SeededRng::new(3);
@@ -91,7 +90,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
     for sample in 0..GRID.samples() {
         let (masked, open) = (masked.front[sample], open.front[sample]);
         assert_eq!(masked, open.filter(|_| stencil.marked[sample]));
-        // Marked is what sees the portal, and no wall or pillar before it.
+        // A sample is marked if its ray reaches the portal before any wall or pillar.
         let ray = &canvas.probes[sample].ray;
         let entry = |b: &WorldBox| judge::entry(ray, b);
         let before = |portal: &judge::Depth| {
