@@ -1,6 +1,6 @@
-//! Depth buffers as a contract.
+//! Interface of depth buffers.
 //!
-//! Occluders are drawn into them and rectangles are tested, in turn.
+//! Occluders are drawn and rectangles are tested, alternately.
 
 use super::outline::Outline;
 use super::rect::{Candidate, Rect, Rects};
@@ -11,10 +11,10 @@ use crate::visibility::SampleGrid;
 
 /// A depth buffer of occluders.
 pub trait OcclusionBuffer {
-    /// True if pixels are drawn that an occluder covers wholly, else by their centres.
+    /// True if an occluder covers only whole pixels; else it covers pixel centres.
     const COVERS_WHOLE: bool;
 
-    /// An empty buffer.
+    /// Creates an empty buffer.
     fn new(grid: SampleGrid) -> Self;
 
     /// Empties the buffer.
@@ -23,7 +23,7 @@ pub trait OcclusionBuffer {
     /// Draws an occluder.
     fn draw<I: Isa>(&mut self, isa: I, outline: &Outline);
 
-    /// Returns `true` if what was drawn is nearer than the rectangle in all its pixels.
+    /// Returns `true` if the buffer is nearer than the rectangle in all its pixels.
     ///
     /// Equal depth does not count as nearer.
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
@@ -65,7 +65,7 @@ pub fn draw<I: Isa, B: OcclusionBuffer>(
 /// Counts of one view.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct CullStats {
-    /// Boxes of nodes and items that were projected.
+    /// Projected boxes of nodes and items.
     pub boxes: usize,
     /// Occluders drawn.
     pub drawn: usize,

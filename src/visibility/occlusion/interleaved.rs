@@ -1,10 +1,10 @@
-//! The interleaved coupling: a front-to-back traversal that tests and draws.
+//! Interleaved coupling: a front-to-back traversal that tests and draws.
 //!
-//! Blocks are tested before they are opened. Large visible items are drawn at once; items
-//! that were found visible early are tested again at the end.
+//! Tests each block before opening it. Draws large visible items at once; tests items that were
+//! found visible early again at the end.
 //!
-//! The nearest open block of the whole tree comes next. Compared with a depth-first order,
-//! fewer items are drawn that a nearer one hides, and a masked buffer loses less
+//! Opens the nearest pending block of the whole tree next. Compared with a depth-first order, it
+//! draws fewer items that a nearer one hides, and a masked buffer loses less
 //! (docs/adr/0021-nearest-block-first.md).
 
 use std::cmp::Reverse;
@@ -18,39 +18,38 @@ use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 use crate::query::{Bits, ItemId};
 
-/// Survivors are drawn that may cover at least this part of the image: a pixel of
-/// 320 x 180.
+/// Default of [`Interleaved::drawn_part`]: one pixel of 320 x 180.
 const DEFAULT_DRAWN_PART: u32 = 65_536;
 
-/// The interleaved coupling, with memory that is kept from view to view.
+/// Interleaved coupling; reuses its memory from view to view.
 #[derive(Clone, Debug)]
 pub struct Interleaved<B> {
-    /// The buffer as the last view left it.
+    /// Depth buffer, as the last view left it.
     pub buffer: B,
     kernel: Kernel,
-    /// Survivors are drawn that may cover at least the image's pixels divided by this.
+    /// Survivors are drawn if they may cover this fraction (1 / n) of the image.
     pub(super) drawn_part: u32,
-    /// The [`key`]s of blocks and their places among the entries.
+    /// [`key`]s of pending blocks, with their indices among the entries.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     entries: Vec<Entry>,
     survivors: Vec<Candidate>,
 }
 
-/// A block that is still to be opened.
+/// A block that is not opened yet.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    /// Its box; its number is the position.
+    /// Box of the block; `position` is the block's number.
     block: Candidate,
     level: u16,
     open: PlaneMask,
-    /// How many occluders had been drawn when the rectangle was looked at.
+    /// Number of occluders drawn before the block's box was tested.
     drawn: u32,
 }
 
-/// The nearest block comes first; of as near ones the first of the lowest level.
+/// Sort key of a block: nearest first, at equal depth the lowest level.
 ///
-/// Upper bits a depth that is not above the block's ([`depth_bits`]), lower ones its level
-/// and its number.
+/// The upper bits hold a lower bound of the block's depth ([`depth_bits`]), the lower bits its
+/// level and its number.
 #[inline(always)]
 fn key(depth: u32, level: u16, block: u32) -> u64 {
     debug_assert!(level < 16 && block >> 28 == 0);
@@ -58,7 +57,7 @@ fn key(depth: u32, level: u16, block: u32) -> u64 {
 }
 
 impl<B: OcclusionBuffer> Interleaved<B> {
-    /// With a buffer, on an instruction set.
+    /// Couples a buffer with an instruction set.
     pub fn new(buffer: B, kernel: Kernel) -> Interleaved<B> {
         Interleaved {
             buffer,
@@ -70,9 +69,10 @@ impl<B: OcclusionBuffer> Interleaved<B> {
         }
     }
 
-    /// Appends the items that no plane of the view's volume excludes, that some ray
-    /// of the image may meet and that are not hidden; the nearest come first,
-    /// roughly.
+    /// Appends the visible items, roughly nearest first.
+    ///
+    /// These are the items that no plane of the view's volume excludes, that some ray of the image
+    /// may meet, and that are not hidden.
     pub fn cull(&mut self, scene: &OccluderScene, view: &View, out: &mut Vec<ItemId>) -> CullStats {
         self.kernel.run(Walk(self, scene, view, out))
     }
@@ -116,11 +116,11 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         });
         let mut rects = Rects::default();
         let mut open = [0; LANES];
-        // Survivors that something was drawn after; the others were tested against all of it.
+        // Number of survivors after which something was drawn; later ones need no second test.
         let mut early = 0;
         while let Some(Reverse((_, place))) = queue.pop() {
             let entry = entries[place as usize];
-            // Much may have been drawn since it was put there.
+            // Occluders may have been drawn since the block was queued.
             let again = !entry.block.near && entry.drawn < stats.drawn as u32;
             if again && buffer.hides(isa, &entry.block.rect) {
                 continue;
@@ -131,7 +131,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             if level > 0 {
                 let (kept, words) = block.sorted_by(isa, view.volume, entry.open);
                 lanes &= kept;
-                // The words leave the vector by a row that adds nothing to them.
+                // Compressing with a full mask stores all words.
                 isa.compress(&mut open, words, LaneMask::MAX);
             } else {
                 lanes &= block.admitted_by(isa, view.volume, entry.open);
@@ -160,7 +160,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 }
                 continue;
             }
-            // Occluders come first, the nearest before the others: they may hide them.
+            // Possible occluders come first, nearest first: they may hide the others.
             let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERS_WHOLE, least_area));
             let mut order = [0; LANES];
             let count = by_depth(&rects.depth, large, &mut order);
@@ -173,7 +173,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 survivors.push(item);
                 let own = draw(isa, buffer, scene, view, &item);
                 if own > 0 {
-                    // No item hides itself.
+                    // An item is not retested for its own occluders: they cannot hide it.
                     early = survivors.len() - 1;
                 }
                 drawn += own;
@@ -227,9 +227,9 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
     count
 }
 
-/// The lanes whose boxes may cover at least `pixels` pixels, about.
+/// Lanes whose boxes may cover at least about `pixels` pixels.
 ///
-/// A rectangle is rounded outward, so the pixels at its rim are covered in part.
+/// Rectangles are rounded outward, so their rim pixels are covered in part.
 #[inline(always)]
 fn coverable_from<I: Isa>(isa: I, rects: &Rects, whole: bool, pixels: u32) -> LaneMask {
     let rim = i32::from(whole);
@@ -242,7 +242,7 @@ fn coverable_from<I: Isa>(isa: I, rects: &Rects, whole: bool, pixels: u32) -> La
     !isa.equal(isa.words(&enough), 0)
 }
 
-/// Bits of a float grow with it from zero on; what is before the eye comes first.
+/// Sortable bits of a depth; a depth not above 0 maps to 0, the nearest.
 #[inline(always)]
 fn depth_bits(depth: f32) -> u32 {
     if depth > 0.0 { depth.to_bits() } else { 0 }

@@ -1,11 +1,10 @@
-//! Masked depth buffers: two depths and a bit a pixel per tile of 8 x 4.
+//! Masked depth buffers: two depths and one bit per pixel in tiles of 8 x 4.
 //!
 //! Hasselgren, Andersson, Akenine-Moeller 2016, "Masked software occlusion culling", High
-//! Performance Graphics. 12 bytes a tile.
+//! Performance Graphics. 12 bytes per tile.
 //!
-//! The layout and the rule of merging are the paper's; outlines instead of
-//! triangles and everything else is not. Two coverage rules, and nothing else,
-//! tell the two back ends apart.
+//! The layout and the merge rule are the paper's; everything else differs (outlines instead of
+//! triangles, for one). The two back ends differ only in their coverage rule.
 
 use super::buffer::OcclusionBuffer;
 use super::outline::{Nearness, Outline};
@@ -15,13 +14,13 @@ use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
 use crate::query::Bits;
 use crate::visibility::SampleGrid;
 
-/// Pixels of a tile: bit `8 * row + column`.
+/// Pixel mask of a tile: bit `8 * row + column`.
 type Mask = u32;
 
-/// A masked buffer; `WHOLE` pixels only, or those whose centre is covered.
+/// Masked buffer that covers whole pixels only (`WHOLE`) or pixel centres.
 ///
-/// Nearness grows towards the eye; 0 is infinitely far. Per tile, all pixels are
-/// covered at least at `reference`, and those of `mask` at least at `working`.
+/// Nearness grows towards the eye; 0 is infinitely far. Per tile, occluders cover all pixels at
+/// nearness `reference` or more, and the pixels of `mask` at `working` or more.
 #[derive(Clone, Debug)]
 pub struct Masked<const WHOLE: bool> {
     columns: usize,
@@ -31,11 +30,12 @@ pub struct Masked<const WHOLE: bool> {
     mask: Vec<Mask>,
 }
 
-/// Pixels that an occluder covers wholly hide what is behind: nothing visible is
-/// ever lost.
+/// Covers only whole pixels: no visible item is ever lost.
+///
+/// A pixel hides what is behind it only if an occluder covers it wholly.
 pub type MaskedInner = Masked<true>;
 
-/// Pixels whose centre is covered hide: what shows between centres is lost.
+/// Covers pixel centres: items visible between centres are lost.
 pub type MaskedCentre = Masked<false>;
 
 impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
@@ -44,7 +44,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     fn new(grid: SampleGrid) -> Self {
         let columns = (grid.width as usize).div_ceil(TILE_WIDTH);
         let rows = (grid.height as usize).div_ceil(TILE_HEIGHT);
-        // So that a chunk that begins with the last tile is whole.
+        // Padding, so that a chunk that starts at the last tile is complete.
         let tiles = columns * rows + LANES;
         Masked {
             columns,
@@ -88,7 +88,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
                 let Some(reference) = self.reference[at..].first_chunk::<LANES>() else {
                     return false;
                 };
-                // In most cases the reference depth of the tile decides.
+                // The reference depth of the tile usually decides.
                 let passed = isa.at_most(isa.load(reference), nearness);
                 for i in Bits((passed & first_lanes(last + 1 - column)).into()) {
                     let i = i as usize;
@@ -104,8 +104,9 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         true
     }
 
-    /// Boxes of two by two tiles at most, as most are, all together; larger ones one
-    /// by one.
+    /// Tests boxes of up to 2 x 2 tiles all together, larger ones one by one.
+    ///
+    /// Most boxes are small.
     #[inline(always)]
     fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
         if lanes == 0 {
@@ -139,9 +140,9 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
 }
 
 impl<const WHOLE: bool> Masked<WHOLE> {
-    /// Lanes that are hidden in the row of tiles that contains the pixels of rows `y`.
+    /// Lanes that are hidden in the row of tiles that contains the pixel rows `y`.
     ///
-    /// Two tiles of the row are tested for `wide` lanes, else one.
+    /// Tests two tiles of the row for `wide` lanes, else one.
     #[inline(always)]
     fn hidden_in_row<I: Isa>(
         &self,
@@ -163,7 +164,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         if open == [0; 2] {
             return lanes;
         }
-        // Not by the reference alone: by the working layer and its pixels.
+        // The reference did not decide: test the working layer and its pixels.
         let working = isa.pairs(&self.working, &at);
         let mut hidden = lanes;
         for side in 0..2 {
@@ -197,8 +198,10 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         hidden
     }
 
-    /// Draws four rows of pixels, given by their first columns and the ones behind
-    /// the last.
+    /// Draws one row of tiles.
+    ///
+    /// `start` and `end` are the first column and the one past the last of each of its four pixel
+    /// rows.
     #[inline(always)]
     fn draw_row<I: Isa>(
         &mut self,
@@ -239,7 +242,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 let right = if right < highest { right } else { highest };
                 near[i] = nearness.within([left, right], lines);
             }
-            // Nearer ones have been drawn all over, the usual case front to back.
+            // Fully covered by something nearer, the usual case front to back.
             let below = isa.at_most(isa.load(&near), isa.load(reference));
             let adds = !below & first_lanes(last - column);
             for half in 0..2 {
@@ -267,24 +270,26 @@ impl<const WHOLE: bool> Masked<WHOLE> {
     }
 }
 
-/// Tiles that are drawn together.
+/// Tiles merged together.
 const CHUNK: usize = 8;
-/// The first columns of sixteen tiles from that of the first one on.
+/// First pixel columns of sixteen tiles, relative to the first tile.
 const STEPS: [f32; LANES] = [
     0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0, 64.0, 72.0, 80.0, 88.0, 96.0, 104.0, 112.0, 120.0,
 ];
 
-/// The part of an occluder in some tiles side by side.
+/// Coverage and nearness of an occluder in adjacent tiles.
 struct Layer {
     mask: [Mask; CHUNK],
     near: [f32; CHUNK],
 }
 
 impl Layer {
-    /// Two layers are kept of three. The paper's rule: give up the working one if it
-    /// lies nearer to the reference than to the new one. A layer adds nothing that
-    /// is no nearer than the reference, or that the working one covers no farther;
-    /// the other way round it takes the working one's place.
+    /// Merges a new layer into reference and working layer (the paper's rule).
+    ///
+    /// Drops the working layer if it lies nearer to the reference than to the new layer. A new
+    /// layer adds nothing if it is no nearer than the reference, or if the working layer covers its
+    /// pixels at least as near; in the opposite case it replaces the working layer. A full layer
+    /// behind the working one becomes the reference.
     #[inline(always)]
     fn merge(
         &self,
@@ -316,7 +321,7 @@ impl Layer {
     }
 }
 
-/// The pixels of the tile from column `left` on that lie in the spans of its rows.
+/// Pixels of the tile at column `left` that lie in the spans of its rows.
 #[inline(always)]
 fn pixels_between(start: &[i32; 4], end: &[i32; 4], left: i32) -> Mask {
     let mut mask = 0;
@@ -329,7 +334,7 @@ fn pixels_between(start: &[i32; 4], end: &[i32; 4], left: i32) -> Mask {
     mask
 }
 
-/// The pixels of a tile that lie in a rectangle which meets the tile.
+/// Pixels of a tile inside a rectangle that overlaps the tile.
 #[inline(always)]
 fn pixels_of(rect: &Rect, column: usize, row: usize) -> Mask {
     let [x0, x1, y0, y1] = each([rect.x0, rect.x1, rect.y0, rect.y1], usize::from);

@@ -1,15 +1,14 @@
 //! Occlusion stage: removes items in the view that other items hide.
 //!
-//! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), one per
-//! file; [`Interleaved`] draws and tests from front to back, with its own tree.
+//! Back ends are depth buffers into which occluders are drawn ([`OcclusionBuffer`]), one per file;
+//! [`Interleaved`] draws and tests front to back, with its own tree.
 //!
-//! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
-//! enters it, between near and far; a box that some ray enters before the near
-//! plane is not drawn; an occluder does not hide items at the same depth. The occluders
-//! of a mesh are boxes inside its items ([`OccluderScene::among`]): a ray that enters one
-//! has met the surface of the item before, unless that was before the near plane. The
-//! occluders of a map are boxes in its solid space, and those of a terrain are boxes below
-//! the ground; neither are items.
+//! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it enters the box,
+//! between near and far. A box that some ray enters before the near plane is not drawn. An occluder
+//! does not hide items at the same depth. The occluders of a mesh are boxes inside its items
+//! ([`OccluderScene::among`]): a ray that enters one has met the surface of the item before, unless
+//! that was before the near plane. The occluders of a map are boxes in its solid space, those of a
+//! terrain boxes below the ground; neither are items.
 
 mod buffer;
 mod interleaved;

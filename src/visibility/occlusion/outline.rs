@@ -1,37 +1,35 @@
-//! The outline of a box in the image, without clipping.
+//! Outline of a box in the image, without clipping.
 //!
-//! It is convex, of at most six half-planes; its nearness is the least of at most three linear
-//! functions.
+//! The outline is a convex intersection of at most six half-planes; the nearness is the minimum of
+//! at most three linear functions.
 //!
 //! # Half-planes
 //!
-//! About the eye, mirror each axis of which the eye is not within the box's slab so
-//! that the box is on its positive side: near bound n > 0, far bound f >= n, and g
-//! the ray's direction along it. A ray enters the box through the face of such an
-//! axis i at depth `n_i / g_i`, and it does hit the box if no slab is left before
-//! all are entered: `n_i / g_i <= f_j / g_j` for each such i and each far bound of
-//! each other axis j, or, without dividing, `f_j g_i - n_i g_j >= 0`. Directions
-//! are linear functions of the place in the image, so these are half-planes,
-//! wherever the box is: one that crosses the plane of the eye needs no clipping.
-//! The depth is the greatest `n_i / g_i`, so the nearness 1 / depth is the least
-//! `g_i / n_i`, again linear. Parallel rays: the depth at which a slab is entered
-//! is itself linear, and nearness is a base minus depth.
+//! Place the eye at the origin. If the eye is outside the box's slab on an axis, mirror the axis so
+//! that the box is on its positive side: near bound n > 0, far bound f >= n, and g the ray's
+//! direction on the axis. A ray crosses the near bound of such an axis i at depth `n_i / g_i`. It
+//! hits the box if it enters all slabs before it leaves any: `n_i / g_i <= f_j / g_j` for each such
+//! i and each far bound of each other axis j, or without division `f_j g_i - n_i g_j >= 0`.
+//! Directions are linear functions of the position in the image, so these are half-planes, wherever
+//! the box is: a box that crosses the plane of the eye needs no clipping. The depth is the maximum
+//! of `n_i / g_i`, so the nearness 1 / depth is the minimum of `g_i / n_i`, again linear. With
+//! parallel rays, the depth at which a slab is entered is itself linear, and nearness is a base
+//! minus depth.
 //!
 //! # Open faces
 //!
-//! Let Z be the least z of all items as written, the eye not below it, and a box
-//! whose z begins at Z. Drawn as if it went down for ever it hides nothing that is
-//! visible: let a ray enter the extended box at a point p. If p is not below Z it
-//! is in the box itself, which the ray thus enters there or before, and not before
-//! the near plane (`View::entered_before_near`). If p is below Z, the ray descends,
-//! as it began at or above Z, and whatever it meets from there on would lie below Z:
-//! there is nothing. So no item is met behind p by that ray, and items before p are
-//! not behind the extension either. The same holds for the five other faces of the
-//! scene's bounds and for several of them at once: p is in the box itself, or
-//! beyond an open face. Parallel rays must not run towards the inner side of an
-//! open face. Comparisons are exact, of numbers as written; that occluders are
-//! rounded inward does not matter, as what the extension fills up to an open face
-//! is part of the box.
+//! Let Z be the least z of all items as written. Let the eye be at or above Z, and let a box start
+//! at z = Z. The box extended down to infinity hides nothing that is visible. Proof: let a ray
+//! enter the extended box at a point p. If p is not below Z, it is in the box itself, which the ray
+//! thus enters there or before, and not before the near plane (`View::entered_before_near`). If p
+//! is below Z, the ray descends, as it started at or above Z, and could only meet things below Z
+//! from there on: there are none. So that ray meets no item behind p, and items before p are not
+//! behind the extension either.
+//!
+//! The same holds for the other five faces of the scene's bounds and for several at once: p is in
+//! the box itself, or beyond an open face. Parallel rays must not run towards the inner side of an
+//! open face. Comparisons are exact, on numbers as written. Occluders may be rounded inward: the
+//! gap that the extension fills up to an open face is part of the box.
 
 use glam::DVec3;
 
@@ -41,30 +39,31 @@ use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
 use crate::kernel::each;
 
-/// A bound of the columns: `at + slope * row`, rounded inward.
+/// Bound of the covered columns: `at + slope * row`, rounded inward.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bound {
     at: f32,
     slope: f32,
 }
 
-/// 2^23: a number from 0 up to it, added to it, is rounded to a whole one, which is
-/// then in the lower bits.
+/// 2^23: adding it to a number in 0..=2^23 rounds that to an integer.
+///
+/// The lower bits of the sum then hold the integer.
 const WHOLE_NUMBERS: f32 = (1u32 << 23) as f32;
 
-/// The pixels that a box covers and how near it is there.
+/// Pixels that a box covers, and its nearness there.
 #[derive(Clone, Default, Debug)]
 pub struct Outline {
-    /// First `lower` bounds from below, then `upper` ones from above, of columns.
+    /// Lower bounds of the columns; the first `lower_count` are in use.
     lower: [Bound; 8],
     lower_count: usize,
     upper: [Bound; 8],
     upper_count: usize,
-    /// First row and the one behind the last.
+    /// First row and the one past the last.
     rows: [f64; 2],
-    /// No columns before the first and from the second on.
+    /// Range of columns outside of which the outline is empty.
     columns_within: [f64; 2],
-    /// The least of these is the nearness, rounded down already.
+    /// Linear functions whose minimum is the nearness, already rounded down.
     faces: [Linear; 3],
     face_count: usize,
     /// Lower bound of the nearness.
@@ -72,13 +71,14 @@ pub struct Outline {
     /// Columns of the padded image.
     columns: f64,
     height: f64,
-    /// True if it covers the pixels that are wholly within it, else by their centres.
+    /// True if the outline covers only whole pixels; else it covers pixel centres.
     covers_whole: bool,
 }
 
 impl Outline {
-    /// The outline of a box; `None` where it covers no pixel or the eye is in it.
-    /// Those faces that are `open` are drawn as if they lay infinitely far out.
+    /// Outline of a box; `None` if it covers no pixel or the eye is in it.
+    ///
+    /// The `open` faces are drawn as if they were infinitely far out.
     #[inline(always)]
     pub fn of(inner: &Aabb, open: Faces, view: &View, covers_whole: bool) -> Option<Outline> {
         if inner.is_empty() {
@@ -133,8 +133,7 @@ impl Outline {
                     edge(low[j], -low[j], n);
                 }
             }
-            // A little farther than it is: n may be wrong by its error, and so may
-            // what is divided.
+            // Moved slightly farther away to cover the errors of n and of the dividend.
             let n = n + MARGIN * (n + zero);
             let mut nearness = g.times(1.0 / n);
             nearness.c -= MARGIN * view.reach / n;
@@ -149,7 +148,7 @@ impl Outline {
         let f = view.forward.abs();
         let (toward, near, far, beside) = mirrored(low, high, view, |axis| view.forward[axis]);
         let zero = view.far_from_zero + view.reach;
-        // Rays that run along a slab are in it all the way or not at all.
+        // Rays parallel to a slab are inside it everywhere or nowhere.
         for j in (0..3).filter(|&j| !toward[j]) {
             let margin = |bound: f64| MARGIN * (bound.abs() + zero);
             if high[j].is_finite() {
@@ -179,10 +178,11 @@ impl Outline {
         self.floor = (view.far - depth) - MARGIN * (size + zero + view.far.abs());
     }
 
-    /// Only where `edge >= margin`, at the centre of a pixel or at all its corners.
+    /// Restricts the outline to `edge >= margin`.
     ///
-    /// The margin is 2^-44 of what the edge's terms can reach in the padded image;
-    /// dividing by its slope, adding up and rounding take less than 2^-50 of that.
+    /// Applies to pixel centres, or to all corners of a pixel. The margin is 2^-44 of what the
+    /// edge's terms can reach in the padded image; dividing by its slope, adding and rounding lose
+    /// less than 2^-50 of that.
     #[inline(always)]
     fn keep(&mut self, edge: Linear, margin: f64) {
         let Linear { x, y, c } = edge;
@@ -192,10 +192,10 @@ impl Outline {
                 false => 0.5 * (x + y),
             };
         if x.abs() * self.columns >= margin {
-            // In f32: u of each term for rounding it, u of the product, u of both for
-            // the sum, and u of a column for the half that is added: 4 u of the terms
-            // and 2 u of the width cover it. Lines along the rows have large terms,
-            // but it is across them that a shift counts.
+            // In f32: u of each term for its rounding, u of the product, u of both for the sum, and
+            // u of a column for the half that is added: 4 u of the terms and 2 u of the width cover
+            // it. Lines that run almost along the rows have large terms, but only a shift across
+            // them counts.
             let (at, slope) = (-c / x, -y / x);
             let size = at.abs() + slope.abs() * self.height;
             let error = f64::from(U) * (4.0 * size + 2.0 * (self.columns + 1.0));
@@ -213,11 +213,11 @@ impl Outline {
             }
             return;
         }
-        // Along the rows but for less than the margin over the whole width.
+        // Along the rows, except for less than the margin over the whole width.
         let c = c - margin;
         let [first, end] = self.rows;
         if y.abs() * end < margin {
-            // Here or nowhere. (A NaN is nowhere.)
+            // Everywhere or nowhere; NaN means nowhere.
             let is_here = c - margin >= 0.0;
             if !is_here {
                 self.rows = [0.0, 0.0];
@@ -229,9 +229,10 @@ impl Outline {
         }
     }
 
-    /// Leaves out what lies more than a tile beside the box's own rectangle: what
-    /// open faces add there hides only what is below the floor, or beyond another
-    /// face, in almost all of its pixels.
+    /// Clips the outline to the box's own rectangle enlarged by one tile.
+    ///
+    /// Almost all pixels that open faces add beyond that hide only what is below the floor, or
+    /// beyond another face.
     pub fn within(&mut self, rect: &Rect) {
         let tile = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
         let [left, right] = self.columns_within;
@@ -242,13 +243,14 @@ impl Outline {
         self.rows = [top.max(y0 - tile[1]), bottom.min(y1 + tile[1])];
     }
 
-    /// First row and the one behind the last that may have columns.
+    /// First row and the one past the last that may have columns.
     pub fn rows(&self) -> (usize, usize) {
         (self.rows[0] as usize, self.rows[1] as usize)
     }
 
-    /// For `N` rows from `first` on: the first column and the one behind the last;
-    /// none where the second is not above the first.
+    /// For `N` rows from `first` on: first column and the one past the last.
+    ///
+    /// A row is empty if the second is not above the first.
     #[inline(always)]
     pub fn spans<const N: usize>(&self, first: usize) -> ([i32; N], [i32; N]) {
         let [left, right] = self.columns_within;
@@ -271,8 +273,9 @@ impl Outline {
         let mut start = [0; N];
         let mut end = [0; N];
         for i in 0..N {
-            // Half a column on and to the nearest whole one: up, and for the end one
-            // behind what is rounded down. Ties may lose a column.
+            // Half a column is added and the sum rounded to nearest: this rounds the first column
+            // up and gives the end column, one past the rounded-down last one. Ties may lose a
+            // column.
             let row = first + i as f32;
             let within =
                 (row >= top) & (row < bottom) & (high[i] >= 0.0) & (low[i] <= right as f32);
@@ -284,16 +287,16 @@ impl Outline {
         (start, end)
     }
 
-    /// The nearness of parts of tiles, never above that of any covered pixel in them.
+    /// Nearness within tiles, in f32, never above that of any covered pixel.
     #[inline(always)]
     pub fn per_tile(&self) -> Nearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
         for (i, face) in self.faces[..self.face_count].iter().enumerate() {
-            // Six u of the greatest terms: one for rounding each coefficient, one for each
-            // product, two sums.
+            // Six u of the largest terms: one for rounding each coefficient, one for each product,
+            // two sums.
             let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
             let constant = face.c - 6.0 * f64::from(U) * size;
-            // What overflows f32 says nothing: the floor counts.
+            // A face that overflows f32 is ignored: the floor decides.
             faces[i] = match size < 1e38 {
                 true => [constant as f32, face.x as f32, face.y as f32],
                 false => [f32::NEG_INFINITY, 0.0, 0.0],
@@ -306,10 +309,10 @@ impl Outline {
     }
 }
 
-/// Axes of which a face is turned to the eye, near and far bounds, rays along axes.
+/// Facing axes, near and far bounds, and rays, mirrored to positive sides.
 ///
-/// Axes of which `side` is below zero are mirrored, so that rays enter by the near
-/// bounds. No face of an axis whose `side` is zero is turned to the eye.
+/// An axis is mirrored if its `side` is below zero, so that rays enter through the near bound. If
+/// `side` is zero, no face of the axis faces the eye.
 #[inline(always)]
 fn mirrored(
     low: DVec3,
@@ -332,7 +335,7 @@ fn mirrored(
     (toward, near, far, along)
 }
 
-/// The nearness of an outline in f32.
+/// Nearness of an outline in f32.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearness {
     faces: [[f32; 3]; 3],
@@ -340,11 +343,12 @@ pub struct Nearness {
 }
 
 impl Nearness {
-    /// From the column `left` to the column `right` and from the row `top` to the row
-    /// `bottom`, edges of pixels.
+    /// Lower bound of the nearness in a rectangle of the image.
+    ///
+    /// The rectangle is given by pixel edges: columns `left` to `right`, rows `top` to `bottom`.
     #[inline(always)]
     pub fn within(&self, [left, right]: [f32; 2], [top, bottom]: [f32; 2]) -> f32 {
-        // At the farthest corner of each face.
+        // Value at the farthest corner of each face.
         let at = |f: [f32; 3]| {
             let column = if f[1] < 0.0 { right } else { left };
             let row = if f[2] < 0.0 { bottom } else { top };
@@ -355,7 +359,8 @@ impl Nearness {
     }
 }
 
-/// The greatest depth of any point of the box, and how large its terms are.
+/// Greatest depth of the box, and the sum of the sizes of its terms.
+///
 /// Infinite if an open face makes it so.
 fn farthest(low: DVec3, high: DVec3, forward: DVec3) -> (f64, f64) {
     let mut depth = 0.0;

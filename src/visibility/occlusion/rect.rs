@@ -4,46 +4,42 @@
 //!
 //! # Error analysis
 //!
-//! u = 2^-24. A bound of a box becomes a coordinate c about the eye by two
-//! subtractions: of the eye rounded to f32, and of what that left (at most u of the
-//! eye's coordinate e). The first one is exact if the bound is within a factor of
-//! two of e; otherwise its result is more than e / 2, and what the second one takes
-//! off is nothing against it. So `|error of c| <= 2.01 u |c| + 1.01 u^2 |e|`.
+//! u = 2^-24. A bound of a box is made relative to the eye by two subtractions: of the eye rounded
+//! to f32, and of the remainder of that rounding (at most u of the eye's coordinate e). The first
+//! subtraction is exact if the bound is within a factor of two of e. Otherwise its result is larger
+//! than e / 2, and the second subtraction is negligible against it. So the coordinate c has
+//! `|error| <= 2.01 u |c| + 1.01 u^2 |e|`.
 //!
-//! A sum of three products with a row m of the projection adds u for the row's own
-//! rounding, u for the product and 2 u for the sums: with r >= |c| + u |e|, where
-//! |c| is the length of the longest corner, `|error| <= 6.2 u |m| r` by Cauchy and
-//! Schwarz. The row of depths has length 1.
+//! A sum of three products with a row m of the projection adds u for the row's own rounding, u for
+//! the product and 2 u for the sums. Let r >= |c| + u |e|, where |c| is the length of the farthest
+//! corner; then `|error| <= 6.2 u |m| r` by Cauchy-Schwarz. The row of depths has length 1.
 //!
-//! Perspective: let w be the least depth of a corner. Boxes with `w <= r / 4096`
-//! are *near*: they have no rectangle and are never hidden. For the others the
-//! computed w is true to 1 part in 600, and X / w is wrong by at most
-//! `(r / w) u (6.3 |m| + 6.3 |x|)` by the sums and 2.1 u |x| by reciprocal and
-//! product, together `(r / w) u (6.3 |m| + 8.4 |x|)`, as r / w >= 0.99. For corners
-//! in the image and as far again beside it, |x| <= 2 size, so
-//! `10 u (|m| + 2 size) r / w` is enough and leaves more than 3 u size for the
-//! subtraction of the slack itself. A corner farther away than that may be wrong by
-//! more, but by less than its distance from the image (the factor is below 1 / 400),
-//! and is clamped to the image anyway.
+//! Perspective: let w be the least depth of a corner. Boxes with `w <= r / 4096` are *near*: they
+//! have no rectangle and are never hidden. For the others the computed w is accurate to 1 part in
+//! 600. X / w is wrong by at most `(r / w) u (6.3 |m| + 6.3 |x|)` from the sums and 2.1 u |x| from
+//! reciprocal and product, together `(r / w) u (6.3 |m| + 8.4 |x|)`, as r / w >= 0.99. Corners in
+//! the image, and up to one image size beside it, have |x| <= 2 size. So `10 u (|m| + 2 size) r /
+//! w` is enough and leaves more than 3 u size for the subtraction of the slack itself. A corner
+//! farther away may be wrong by more, but by less than its distance from the image (the factor is
+//! below 1 / 400), and is clamped to the image anyway.
 //!
-//! Parallel rays: as above without the division, `6.2 u |m| r + 2 u |x|` and u of
-//! the shift: `10 u (|m| r + |shift| + 2 size)`.
+//! Parallel rays: as above without the division, `6.2 u |m| r + 2 u |x|` and u of the shift: `10 u
+//! (|m| r + |shift| + 2 size)`.
 //!
-//! Depth: the least w is lowered by 8 u r (6.2 u r and the subtraction). Its
-//! reciprocal is raised by 8 u of itself. With parallel rays nearness is
-//! `base - w`, true to 2 u of both, and raised by 8 u of both.
+//! Depth: the least w is lowered by 8 u r (6.2 u r and the subtraction). Its reciprocal is raised
+//! by 8 u of itself. With parallel rays nearness is `base - w`, accurate to 2 u of both, and raised
+//! by 8 u of both.
 //!
-//! Underflow: with w > 1e-25 and r < 1e25 nothing that counts is subnormal but, with
-//! parallel rays, coordinates, whose loss is added to the slack. Overflow: boxes with
-//! |m| r > 1e37 are near too, and in windows so narrow that |m| is infinite in f32 all
-//! boxes are. Comparisons are such that a NaN makes a box near.
+//! Underflow: with w > 1e-25 and r < 1e25 no significant value is subnormal except coordinates with
+//! parallel rays, whose loss is added to the slack. Overflow: boxes with |m| r > 1e37 are near too;
+//! in windows so narrow that |m| is infinite in f32, all boxes are near. Comparisons are written so
+//! that a NaN makes a box near.
 
 use super::view::{Projection, U, View};
 use crate::geometry::{BoxBlock, BoxCorner};
 use crate::kernel::{Isa, LANES, LaneMask};
 
-/// Pixels and nearness of one box: columns and rows from the first to the last
-/// one, both included.
+/// Pixel rectangle and nearness of one box; first and last are inclusive.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Rect {
     /// First column.
@@ -54,26 +50,26 @@ pub struct Rect {
     pub y0: u16,
     /// Last row.
     pub y1: u16,
-    /// Not below the box's greatest nearness: 1 / depth, or base - depth.
+    /// Upper bound of the box's nearness: 1 / depth, or base - depth.
     pub nearness: f32,
 }
 
-/// A box that may be hidden.
+/// A box to be tested for being hidden.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
-    /// The rectangle, if there is one.
+    /// Rectangle, valid unless `near`.
     pub rect: Rect,
     /// Position in tree order.
     pub position: u32,
-    /// `true` if there is no rectangle, as the box is too near.
+    /// `true` if the box is too near to have a rectangle.
     pub near: bool,
 }
 
-/// The rectangles of a block's boxes.
+/// Rectangles of a block's boxes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub struct Rects {
-    /// First columns, pixels.
+    /// First columns, in pixels.
     pub x0: [i32; LANES],
     /// Last columns.
     pub x1: [i32; LANES],
@@ -83,16 +79,16 @@ pub struct Rects {
     pub y1: [i32; LANES],
     /// [`Rect::nearness`] of each box.
     pub nearness: [f32; LANES],
-    /// Not above the least depth: what boxes are sorted by.
+    /// Lower bounds of the least depths, by which boxes are sorted.
     pub depth: [f32; LANES],
-    /// The lanes that some ray of the image may meet.
+    /// Lanes that some ray of the image may meet.
     pub seen: LaneMask,
-    /// The lanes that have a rectangle; the others are too near.
+    /// Lanes that have a rectangle; the others are too near.
     pub flat: LaneMask,
 }
 
 impl Rects {
-    /// One lane.
+    /// Rectangle of one lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Rect {
         Rect {
@@ -104,7 +100,7 @@ impl Rects {
         }
     }
 
-    /// The box of a lane, which is at a position of the tree.
+    /// Box of a lane, at a position of the tree.
     #[inline(always)]
     pub fn candidate(&self, lane: usize, position: usize) -> Candidate {
         Candidate {
@@ -114,7 +110,7 @@ impl Rects {
         }
     }
 
-    /// Puts a rectangle into a lane; what else is known of the lane stays.
+    /// Stores a rectangle in a lane; the lane's other fields stay as they are.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, rect: &Rect) {
         self.x0[lane] = i32::from(rect.x0);
@@ -145,7 +141,7 @@ impl Rects {
             least = isa.min(depth, least);
             *row = inverses(isa.to_array(depth));
         }
-        // The least and the greatest x and y.
+        // Least and greatest x and y.
         let none = [isa.splat(f32::INFINITY), isa.splat(f32::NEG_INFINITY)];
         let mut extremes = [none; 2];
         for (axis, row) in p.rows[..2].iter().enumerate() {
@@ -200,7 +196,7 @@ impl Rects {
         self.finish(isa, boxes, p, &extremes, [depth, raised], 0);
     }
 
-    /// From the least and greatest x and y to pixels.
+    /// Converts least and greatest x and y to pixels.
     #[inline(always)]
     fn finish<I: Isa>(
         &mut self,
@@ -226,11 +222,11 @@ impl Rects {
     }
 }
 
-/// Sixteen boxes about the eye.
+/// Sixteen boxes relative to the eye.
 struct AboutEye<I: Isa> {
-    /// Axis by axis the lower and the upper bounds.
+    /// Lower and upper bounds, by axis.
     bounds: [[I::Floats; 2]; 3],
-    /// The size that all errors are relative to, negated: -r.
+    /// Size that all errors are relative to, negated: -r.
     minus_size: I::Floats,
 }
 
@@ -253,7 +249,7 @@ impl<I: Isa> AboutEye<I> {
         AboutEye { bounds, minus_size }
     }
 
-    /// The products of the bounds with a row.
+    /// Products of the bounds with a row.
     #[inline(always)]
     fn products(&self, isa: I, row: &[f32; 3]) -> [[I::Floats; 2]; 3] {
         let mut products = self.bounds;
@@ -265,7 +261,7 @@ impl<I: Isa> AboutEye<I> {
         products
     }
 
-    /// The least product with a row at any corner, and the greatest one.
+    /// Least and greatest product of a row with any corner.
     #[inline(always)]
     fn range(&self, isa: I, row: &[f32; 3]) -> [I::Floats; 2] {
         let mut low = [isa.splat(0.0); 3];
@@ -281,7 +277,7 @@ impl<I: Isa> AboutEye<I> {
     }
 }
 
-/// The sum of products at corner 0 to 7: bit `axis` takes the upper bound.
+/// Sum of products at corner 0 to 7: bit `axis` selects the upper bound.
 #[inline(always)]
 fn at_corner<I: Isa>(isa: I, p: &[[I::Floats; 2]; 3], corner: usize) -> I::Floats {
     let across = isa.add(p[0][corner & 1], p[1][corner >> 1 & 1]);
@@ -296,10 +292,10 @@ fn inverses(mut row: [f32; LANES]) -> [f32; LANES] {
     row
 }
 
-/// The pixels that hold coordinates, or the nearest ones.
+/// Pixels that contain the coordinates, clamped to the image.
 #[inline(always)]
 fn pixels<I: Isa>(isa: I, at: I::Floats, size: f32) -> [i32; LANES] {
-    // The bound, if the other is a NaN.
+    // Returns the bound if `at` is NaN.
     let at = isa.max(at, isa.splat(0.0));
     isa.whole(isa.min(at, isa.splat(size - 1.0)))
 }

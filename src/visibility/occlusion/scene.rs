@@ -1,4 +1,4 @@
-//! The items of a scene, prepared once for occlusion.
+//! Items of a scene, prepared once for occlusion.
 //!
 //! They are in a packed tree of blocks of sixteen, each with its occluders.
 
@@ -10,41 +10,44 @@ use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::visibility::Solids;
 
-/// Some of a box's six faces: bit `axis` is the lower one, bit `3 + axis` the
-/// upper one.
+/// Set of a box's six faces.
+///
+/// Bit `axis` is the lower face, bit `3 + axis` the upper face.
 pub type Faces = u8;
 
 /// A box that hides what is behind it.
 #[derive(Clone, Copy, Debug)]
 pub struct Occluder {
-    /// Scene-local, within what it stands for.
+    /// Scene-local box, inside the item or solid that it stands for.
     pub inner: Aabb,
-    /// The faces of the scene's bounds that it reaches, as written, exactly.
+    /// Faces of the scene's bounds that it reaches, compared exactly as written.
     pub faces: Faces,
 }
 
-/// A scene's items in a tree of which every node has sixteen children but the
-/// last ones: the children of box `j` of a level are block `j` of the level below.
+/// Items of a scene in a packed 16-wide tree.
+///
+/// Every node except the last of a level has sixteen children: the children of box `j` of a level
+/// are block `j` of the level below.
 #[derive(Clone, Debug)]
 pub struct OccluderScene {
-    /// World position of the zero of the boxes.
+    /// World position of the boxes' origin.
     pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
     pub levels: Vec<BoxBlocks>,
-    /// In tree order, as what hides.
+    /// Box numbers in tree order; numbers from `items` on are occluders only.
     ids: Vec<ItemId>,
     /// All occluders, in tree order.
     occluders: Vec<Occluder>,
-    /// First occluder of each position; at the end their number.
+    /// First occluder of each position, then the number of occluders.
     first_occluders: Vec<u32>,
-    /// How many of the boxes are items; those behind them only hide.
+    /// Number of items; boxes of higher number are occluders only.
     items: usize,
-    /// The union of the boxes as they were written.
+    /// Union of the boxes as written.
     pub(super) bounds: WorldBox,
 }
 
 impl OccluderScene {
-    /// Solid boxes, which hide what is behind them. O(n log n).
+    /// Tree of solid boxes, which are their own occluders. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
         let written = solids.boxes.iter().copied();
         let bounds = WorldBox::union_of(written.clone());
@@ -53,15 +56,15 @@ impl OccluderScene {
         OccluderScene::sorted(solids.origin, &solids.outer, hiding, bounds)
     }
 
-    /// Items with boxes inside that hide, among boxes that hide and are no items.
+    /// Tree of items with inner boxes, and of occluders that are not items.
     ///
-    /// O(n log n). Each of `inner` has its item, by ascending item. `blocks` are below ground or in the
-    /// rock between the rooms of a map. All are scene-local.
+    /// O(n log n). `inner` pairs each inner box with its item, by ascending item. `blocks` are
+    /// below ground or in the rock between the rooms of a map. All are scene-local.
     pub fn among(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
         let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
         let hiding = inner.iter().copied().chain(numbered);
-        // Rounded inward: what hides reaches a face only if this does.
+        // Rounded inward: the solid reaches a face if the rounded box does.
         let within = |inner: Aabb| (inner, WorldBox::within(&inner, scene.origin));
         let hiding = hiding.map(|(number, inner)| (number, within(inner)));
         let outer = [&scene.items[..], blocks].concat();
@@ -70,8 +73,10 @@ impl OccluderScene {
         among
     }
 
-    /// Boxes by number, and what hides, also as written, with the number of what it
-    /// stands for, by ascending number.
+    /// Builds the tree over `outer` boxes, numbered by index.
+    ///
+    /// Each of `hiding` is an occluder, rounded and as written, with the number of its outer box,
+    /// by ascending number.
     fn sorted(
         origin: DVec3,
         outer: &[Aabb],
@@ -110,32 +115,32 @@ impl OccluderScene {
         }
     }
 
-    /// Number of boxes in the tree: items, and what hides and is none.
+    /// Number of boxes in the tree, occluders that are not items included.
     #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// The item at a position in tree order; `None` for what hides and is no item.
+    /// Item at a position in tree order; `None` for an occluder that is not an item.
     #[inline(always)]
     pub fn item(&self, position: usize) -> Option<ItemId> {
         let id = self.ids[position];
         ((id as usize) < self.items).then_some(id)
     }
 
-    /// The lanes of a block that hold a box.
+    /// Lanes of a block that hold a box.
     #[inline(always)]
     pub fn lanes(&self, level: usize, block: usize) -> LaneMask {
         first_lanes(self.levels[level].len() - block * LANES)
     }
 
-    /// The outer box at a position: what may be hidden.
+    /// Outer box at a position, which is tested for being hidden.
     #[inline(always)]
     pub fn outer(&self, position: usize) -> Aabb {
         self.levels[0].get(position)
     }
 
-    /// Occluders at a position; none where the item is not solid.
+    /// Occluders at a position; none if the item is not solid.
     #[inline(always)]
     pub fn occluders(&self, position: usize) -> &[Occluder] {
         let [first, end] = [position, position + 1].map(|at| self.first_occluders[at] as usize);
@@ -143,8 +148,9 @@ impl OccluderScene {
     }
 }
 
-/// Orders the items so that each run of `capacity` of them (the last may be
-/// shorter) lies close together, and each sixteenth of a run too.
+/// Sorts the items so that each run of `capacity` is compact.
+///
+/// The last run may be shorter. Each sixteenth of a run is compact too, recursively.
 fn sort_into(ids: &mut [ItemId], capacity: usize, centres: &[Vec3]) {
     if ids.len() <= capacity {
         if capacity > LANES {
@@ -164,7 +170,7 @@ fn sort_into(ids: &mut [ItemId], capacity: usize, centres: &[Vec3]) {
     sort_into(behind, capacity, centres);
 }
 
-/// The lower faces of some axes, and the upper faces of some.
+/// Set of the lower faces of some axes and the upper faces of others.
 pub fn faces(low: BVec3, high: BVec3) -> Faces {
     (low.bitmask() | high.bitmask() << 3) as Faces
 }

@@ -1,10 +1,10 @@
-//! A camera as the occlusion stage needs it.
+//! Camera in the form that the occlusion stage needs.
 //!
-//! Rays of an image, as linear functions of the place in the image (f64, for what
-//! is drawn), and a point's place in it (f32, for the sixteen boxes of a block).
+//! Rays of an image as linear functions of the position in the image (f64, for drawing), and the
+//! projection of points to the image (f32, for the sixteen boxes of a block).
 //!
-//! The image has x from 0 to width and y from 0, the top, to height: the pixel in
-//! column c and row r is the closed square `[c, c + 1] x [r, r + 1]`.
+//! The image has x from 0 to width and y from 0, the top, to height: the pixel in column c and row
+//! r is the closed square `[c, c + 1] x [r, r + 1]`.
 
 use glam::DVec3;
 
@@ -12,27 +12,27 @@ use super::scene::{Faces, OccluderScene, faces};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::visibility::{Rays, SampleGrid};
 
-/// Half a unit in the last place of 1, of f32.
+/// Half a unit in the last place of 1 in f32.
 pub const U: f32 = 1.0 / (1u32 << 24) as f32;
 
-/// Columns of a tile of the buffer.
+/// Columns of a tile of the depth buffer.
 pub const TILE_WIDTH: usize = 8;
-/// Rows of a tile of the buffer.
+/// Rows of a tile of the depth buffer.
 pub const TILE_HEIGHT: usize = 4;
 
-/// `x * a + y * b + c` over the image.
+/// Linear function `x * a + y * b + c` over the image.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Linear {
-    /// Per column.
+    /// Coefficient per column.
     pub x: f64,
-    /// Per row.
+    /// Coefficient per row.
     pub y: f64,
-    /// At the image's upper left corner.
+    /// Value at the image's upper left corner.
     pub c: f64,
 }
 
 impl Linear {
-    /// A function that is the same everywhere.
+    /// Constant function.
     pub const fn constant(c: f64) -> Linear {
         Linear { x: 0.0, y: 0.0, c }
     }
@@ -58,53 +58,56 @@ impl Linear {
     }
 }
 
-/// How positions become pixels, in f32 and about the eye.
+/// Projection of positions to pixels, in f32 and relative to the eye.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
-    /// The eye, rounded to f32, and what the rounding left.
+    /// Eye, rounded to f32.
     pub eye: [f32; 3],
-    /// To be subtracted after the eye.
+    /// Remainder of the rounding, subtracted after the eye.
     pub rest: [f32; 3],
-    /// Rows for x, y and depth: of a perspective lens x and y are still to be
-    /// divided by the depth.
+    /// Rows for x, y and depth.
+    ///
+    /// For a perspective lens x and y are still to be divided by the depth.
     pub rows: [[f32; 3]; 3],
-    /// Added to x and y; zero for a perspective lens.
+    /// Offset of x and y; zero for a perspective lens.
     pub shift: [f32; 2],
-    /// Width and height of the image.
+    /// Width and height of the image in pixels.
     pub size: [f32; 2],
-    /// Error of a coordinate, apart from the box's own size, in units of
-    /// two u: see `rect`.
+    /// Error of a coordinate, apart from the box's own size, in units of 2 u.
+    ///
+    /// See `rect`.
     pub far_from_zero: f32,
     /// Factors of the slack in x and y: see `rect`.
     pub slack: [f32; 2],
-    /// The part of it that no size of a box changes.
+    /// Part of the slack that is independent of the box's size.
     pub slack_added: [f32; 2],
-    /// Depth that depths are subtracted from for an orthographic lens.
+    /// Base of the nearness of an orthographic lens: nearness = base - depth.
     pub base: f32,
-    /// Boxes farther away than this are near: see `rect`. Below 0 all of them are.
+    /// Boxes farther away than this count as near: see `rect`. Below 0 all of them do.
     pub most_size: f32,
 }
 
-/// A camera's rays over the pixels of a buffer, in a scene's coordinates.
+/// Rays of a camera through the pixels of a buffer, in scene coordinates.
 #[derive(Clone, Debug)]
 pub struct View<'v> {
-    /// The volume whose planes say what is in the view at all.
+    /// Volume whose planes decide which items are in the view.
     pub volume: &'v ConvexVolume,
-    /// Pixels.
+    /// Grid of pixels.
     pub grid: SampleGrid,
     /// Width and height of the image in pixels, rounded up to whole tiles.
     pub padded: [f64; 2],
     /// `true` if all rays are parallel.
     pub parallel: bool,
-    /// The eye in scene coordinates.
+    /// Eye in scene coordinates.
     pub eye: DVec3,
-    /// The axis of view.
+    /// Axis of view.
     pub forward: DVec3,
-    /// Perspective: a ray's direction for unit depth, axis by axis. Parallel rays:
-    /// where the ray leaves the plane of the eye, about the eye.
+    /// Rays by axis, as linear functions of the position in the image.
+    ///
+    /// Perspective: direction per unit of depth. Parallel: start in the plane of the eye, relative
+    /// to the eye.
     pub rays: [Linear; 3],
-    /// Largest coordinate of `rays` within the padded image, all axes
-    /// together.
+    /// Largest sum of absolute coordinates of `rays` in the padded image.
     pub reach: f64,
     /// Error of the eye's coordinates, in units of 2^-52.
     pub far_from_zero: f64,
@@ -112,19 +115,21 @@ pub struct View<'v> {
     pub near: f64,
     /// Largest visible depth, or infinity.
     pub far: f64,
-    /// A box that holds all points of rays before the near plane (perspective lenses).
+    /// Box with all points of rays before the near plane (perspective lenses).
     pub before_near: [DVec3; 2],
-    /// The faces of the scene's bounds that no ray passes and comes back through: see
-    /// `outline`.
+    /// Faces of the scene's bounds that no ray crosses from outside.
+    ///
+    /// See `outline`.
     pub open: Faces,
-    /// For the boxes of a block.
+    /// Projection for the boxes of a block.
     pub projection: Projection,
 }
 
 impl<'v> View<'v> {
-    /// A camera's rays in a scene.
+    /// Rays of a camera in a scene.
     ///
-    /// The volume decides which items are in the view; it should hold all that the rays meet.
+    /// The volume decides which items are in the view; it should contain everything that the rays
+    /// meet.
     pub fn new(
         rays: &Rays,
         volume: &'v ConvexVolume,
@@ -152,8 +157,8 @@ impl<'v> View<'v> {
         let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
         let reach: f64 = lines.iter().map(reach).sum();
         let eye = frame.eye - scene.origin;
-        // Parallel rays begin at points of their own, which were rounded in world
-        // coordinates; one that all rays share is exact there.
+        // Each parallel ray has its own start, rounded in world coordinates; the common start of
+        // other rays is exact there.
         let in_world = if parallel { frame.eye } else { DVec3::ZERO };
         let far_from_zero = eye.abs().element_sum() + 4.0 * in_world.abs().element_sum();
         let near = camera.lens.near();
@@ -170,7 +175,7 @@ impl<'v> View<'v> {
             near,
             far: camera.lens.far().unwrap_or(f64::INFINITY),
             before_near: before_near(rays, near, eye, far_from_zero),
-            // Those that the eye is not beyond, or that parallel rays do not leave by.
+            // Faces that the eye is not beyond, or that parallel rays do not enter by.
             open: match parallel {
                 true => faces(forward.cmple(DVec3::ZERO), forward.cmpge(DVec3::ZERO)),
                 false => faces(
@@ -182,7 +187,8 @@ impl<'v> View<'v> {
         }
     }
 
-    /// Returns `true` if some ray may enter the box, or begin in it, before near.
+    /// Returns `true` if some ray may enter the box, or start in it, before near.
+    ///
     /// Such a box may not be drawn: that ray does not meet it.
     #[inline(always)]
     pub fn entered_before_near(&self, outer: &Aabb) -> bool {
@@ -199,16 +205,15 @@ impl<'v> View<'v> {
     }
 }
 
-/// Margin of f64 sums of a few products, relative to the sum of their sizes: 2^-44.
+/// Margin of f64 sums of a few products, relative to their sizes: 2^-44.
 ///
-/// Each coordinate about the eye is wrong by at most
-/// 2^-52 of itself and of the eye's (the eye in scene coordinates was rounded
-/// once, the difference once), each coefficient of a ray by less than 2^-50 of the
-/// ray's reach, the truth's own rays by as much, and a sum of three products adds
-/// 2^-51 of their sizes: less than 2^-47 in all.
+/// Each coordinate relative to the eye is wrong by at most 2^-52 of itself and of the eye's (the
+/// eye in scene coordinates was rounded once, the difference once), each coefficient of a ray by
+/// less than 2^-50 of the ray's reach, the truth's own rays by as much, and a sum of three products
+/// adds 2^-51 of their sizes: less than 2^-47 in all.
 pub const MARGIN: f64 = 1.0 / (1u64 << 44) as f64;
 
-/// The bounds of the pyramid from the eye to the near window, moved outward.
+/// Bounds of the pyramid from the eye to the near window, moved outward.
 fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3; 2] {
     let frame = &rays.camera.frame;
     let [left, right, bottom, top] = rays.window;
@@ -241,7 +246,7 @@ impl Projection {
         // 10 u: derived in `rect`.
         let sizes = if parallel { 0.0 } else { 2.0 };
         let factor = |row: DVec3, size: f64| (10.0 * u_f64 * (row.length() + sizes * size)) as f32;
-        // Subnormal coordinates about the eye lose 2^-149 each.
+        // Subnormal coordinates relative to the eye lose 2^-149 each.
         let lost = |row: DVec3| 4.0 * f64::from(f32::from_bits(1)) * row.abs().element_sum();
         let added = |row: DVec3, shift: f64, size: f64| {
             (lost(row) + 10.0 * u_f64 * (shift.abs() + 2.0 * size)) as f32
@@ -249,7 +254,7 @@ impl Projection {
         let largest = rows[0].abs().max(rows[1].abs()).max_element();
         let most_size = match largest <= 1e37 && shift.iter().all(|s| s.abs() <= 1e37) {
             true => (1e37 / largest).min(1e25),
-            // Infinite in f32, or no number.
+            // Infinite in f32, or NaN.
             false => -1.0,
         };
         Projection {
