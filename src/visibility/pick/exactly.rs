@@ -1,4 +1,4 @@
-//! The exact decision among candidates, and the reference that tests every body.
+//! Exact choice among candidates, and the reference that tests every body.
 
 use std::cmp::Ordering;
 
@@ -7,7 +7,7 @@ use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
 
-/// An item and where a ray meets it.
+/// An item and the point where a ray meets it.
 type Met<B> = (ItemId, <B as Body>::At);
 
 /// Exact order by depth, then by id.
@@ -16,16 +16,16 @@ fn order<B: Body>(probe: &B::Probe, a: &Met<B>, b: &Met<B>) -> Ordering {
     probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
 }
 
-/// The first of the candidates so far that a ray meets.
+/// Nearest candidate so far that a ray meets.
 pub(super) struct First<B: Body> {
     probe: B::Probe,
-    /// Upper bound of the depth of the first one.
+    /// Upper bound of the depth of the nearest candidate.
     limit: f64,
     best: Option<Met<B>>,
 }
 
 impl<B: Body> First<B> {
-    /// Starts without candidates; nothing beyond `limit` counts.
+    /// Starts without candidates; ignores everything beyond `limit`.
     #[inline]
     pub fn new(probe: B::Probe, limit: f64) -> First<B> {
         First {
@@ -35,7 +35,7 @@ impl<B: Body> First<B> {
         }
     }
 
-    /// The first item, if it is one of the first `items`.
+    /// Nearest item, if its id is below `items`.
     #[inline]
     pub fn item(&self, items: usize) -> Option<ItemId> {
         self.best
@@ -61,7 +61,7 @@ impl<B: Body> Visit<B> for First<B> {
 
 /// Appends the first `count` items of the meetings.
 ///
-/// All items as deep as the last of them are included.
+/// Includes all items at the depth of the last of them.
 pub(super) fn nearest<B: Body>(
     probe: &B::Probe,
     mut met: Vec<Met<B>>,
@@ -83,7 +83,7 @@ pub(super) fn nearest<B: Body>(
     out.extend(met.into_iter().map(|(item, _)| item));
 }
 
-/// The truth of picking, by the tree of the truth of samples.
+/// Reference of picking, over the same tree as the sample truth.
 impl<B: Body> Pick for BodyIndex<B> {
     fn first(&self, ray: &Ray) -> Option<ItemId> {
         let front = self.front_of(ray).front;
@@ -100,7 +100,7 @@ impl<B: Body> Pick for BodyIndex<B> {
     }
 }
 
-/// All bodies, item by item.
+/// Linear search over all bodies, item by item.
 #[derive(Clone, Debug)]
 pub struct Linear<B>(pub Bodies<B>);
 
@@ -114,7 +114,7 @@ impl<B: Body> Pick for Linear<B> {
         first.item(self.0.items)
     }
 
-    /// O(n), and sorting what the ray meets.
+    /// O(n + k log k) for the k bodies that the ray meets.
     fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
         let probe = B::probe(ray, self.0.origin);
         let counted = |body: &&B| (body.item() as usize) < self.0.items;

@@ -1,7 +1,7 @@
-//! Picking, the selection under the cursor. One file per back end.
+//! Picking: selection under the cursor. One file per back end.
 //!
-//! Queries are the first item that a ray meets, the nearest few, and everything in the
-//! cursor's frustum.
+//! Queries are the first item that a ray meets, the nearest few, and everything in the cursor's
+//! frustum.
 
 mod exactly;
 mod wide_ray;
@@ -32,50 +32,52 @@ impl<B: Body> Bodies<B> {
     };
 }
 
-/// The items of a scene, to be picked by rays.
+/// Items of a scene, to be picked by rays.
 ///
 /// Solid boxes are met as [`Solids`](crate::visibility::Solids) defines, triangles as
 /// [`Facets::solid`](crate::visibility::truth::Facets::solid) does.
 pub trait Pick: Send + Sync {
-    /// The first item that the ray meets; of several at the same depth the one
-    /// with the lowest id.
+    /// First item that the ray meets; the lowest id of several at the same depth.
     fn first(&self, ray: &Ray) -> Option<ItemId>;
 
     /// Appends the `count` items that the ray meets first.
     ///
-    /// Ordered by depth, then by id. All items at the depth of the last of them are included,
-    /// so there may be more.
+    /// Ordered by depth, then by id. Includes all items at the depth of the last of them, so there
+    /// may be more.
     fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>);
 }
 
-/// A row of the table of back ends; builds one for an instruction set.
+/// Row of the table of back ends; builds one for an instruction set.
 pub type BackEnd<B> = Row<fn(&Bodies<B>, Kernel) -> Box<dyn Pick>>;
 
-/// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower
-/// right one. Closed.
+/// Closed rectangle of the image.
+///
+/// (0, 0) is the image's upper left corner, (1, 1) its lower right one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CursorRectangle {
     /// Upper left corner, across and down.
     pub min: [f64; 2],
-    /// Lower right corner; beyond `min` on both axes.
+    /// Lower right corner; larger than `min` on both axes.
     pub max: [f64; 2],
 }
 
 impl CursorRectangle {
-    /// The rectangle that reaches `half` pixels to each side of a cursor at
-    /// (`x`, `y`), in pixels of an image of that size.
+    /// Rectangle that extends `half` pixels to each side of a cursor.
+    ///
+    /// The cursor is at (`x`, `y`), in pixels of an image of `width` x `height`.
     pub fn around([x, y]: [f64; 2], half: f64, [width, height]: [f64; 2]) -> CursorRectangle {
         let [min, max] = [-half, half].map(|by| [(x + by) / width, (y + by) / height]);
         CursorRectangle { min, max }
     }
 
-    /// Planes about what rays through the rectangle meet, in the f32 of a scene.
+    /// Frustum of everything that rays through the rectangle meet.
     ///
-    /// Those of a camera with the same eye (moved aside for an orthographic lens), near and
-    /// far; moved outward by what they may be off.
+    /// In the f32 coordinates of a scene, for a camera with the same eye (shifted for an
+    /// orthographic lens), near and far. Planes are moved outward by their error bounds.
     ///
     /// # Errors
-    /// An empty rectangle; one that f64 cannot tell from a point; those of [`Camera::volume`].
+    /// An empty rectangle; one that f64 cannot distinguish from a point; the errors of
+    /// [`Camera::volume`].
     pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
         let camera = &rays.camera;
         let [left, right, bottom, top] = rays.window;

@@ -1,6 +1,6 @@
-//! Picking by the tree of the truth, sixteen slab tests at once.
+//! Picking with the tree of the sample truth, sixteen slab tests at once.
 //!
-//! Each body whose box may be entered before what was found is tested exactly at once.
+//! A body is tested exactly as soon as its box may be entered before the nearest hit so far.
 
 use super::Pick;
 use super::exactly::{self, First};
@@ -9,12 +9,12 @@ use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
 
-/// The bodies of a scene, to be picked by an instruction set.
+/// Bodies of a scene, to be picked with an instruction set.
 #[derive(Clone, Debug)]
 pub struct WideRay<B>(BodyIndex<B>);
 
 impl<B: Body> WideRay<B> {
-    /// Builds the tree, whose answers are those of any `kernel`. O(n log n).
+    /// Builds the tree. O(n log n). Its answers do not depend on the `kernel`.
     pub fn of(bodies: &Bodies<B>, kernel: Kernel) -> WideRay<B> {
         WideRay(BodyIndex::of(bodies, kernel))
     }
@@ -48,13 +48,13 @@ impl<B: Body> Pick for WideRay<B> {
     }
 }
 
-/// The meetings with the first `count` items so far.
+/// Meetings with the first `count` items so far.
 struct Several<'a, B: Body> {
     items: usize,
     probe: &'a B::Probe,
     count: usize,
     far: f64,
-    /// The lowest upper bounds of depths, with their items; `count` at most, sorted.
+    /// Lowest upper bounds of depths, with their items; at most `count`, sorted.
     lowest: Vec<(f64, ItemId)>,
     met: Vec<(ItemId, B::At)>,
 }

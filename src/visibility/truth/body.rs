@@ -14,17 +14,17 @@ use crate::visibility::{Ray, Solids};
 
 /// A body that rays meet.
 pub trait Body: Copy + Debug + Send + Sync + 'static {
-    /// A ray prepared for such bodies.
+    /// Ray prepared for bodies of this kind.
     type Probe: Along<At = Self::At> + Debug;
-    /// A point of a ray on the surface of such a body.
+    /// Point where a ray meets the surface of a body.
     type At: Copy + Debug;
-    /// `true` if an item is one body that fills its bounding box.
+    /// `true` if an item is a single body that fills its bounding box.
     const IS_BOX: bool;
 
     /// Prepares a ray for bodies whose local coordinates are relative to `origin`.
     fn probe(ray: &Ray, origin: DVec3) -> Self::Probe;
 
-    /// The item that the body belongs to.
+    /// Item that the body belongs to.
     fn item(&self) -> ItemId;
 
     /// Returns `true` if the body hides what is behind it.
@@ -37,14 +37,14 @@ pub trait Body: Copy + Debug + Send + Sync + 'static {
 /// An item as a solid box.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SolidBox {
-    /// The box as written in the scene.
+    /// Box as written in the scene.
     pub b: WorldBox,
-    /// The item.
+    /// Id of the item.
     pub item: ItemId,
 }
 
 impl SolidBox {
-    /// Some items of these boxes.
+    /// Bodies of some of these boxes, given by item.
     pub fn some<'a>(
         boxes: &'a [WorldBox],
         items: &'a [ItemId],
@@ -90,16 +90,16 @@ impl Body for SolidBox {
 pub struct Facet {
     /// Scene-local corners, counter-clockwise seen from the front.
     pub corners: [Vec3; 3],
-    /// The item.
+    /// Id of the item.
     pub item: ItemId,
-    /// `true` if rays meet it from behind too.
+    /// `true` if rays meet the triangle from behind too.
     pub two_sided: bool,
-    /// `true` if it hides what is behind it.
+    /// `true` if the triangle hides what is behind it.
     pub hides: bool,
 }
 
 impl Facet {
-    /// A triangle of an item of surfaces; an opaque one hides what is behind it.
+    /// Triangle of an item of surfaces; it hides if it is opaque.
     pub fn of(surfaces: &Surfaces, item: usize, triangle: u32) -> Facet {
         Facet {
             corners: surfaces.corners(triangle),
@@ -136,37 +136,37 @@ impl Body for Facet {
     }
 }
 
-/// The bodies of a scene, of which ray indexes are built.
+/// Bodies of a scene, over which ray indexes are built.
 #[derive(Clone, Debug)]
 pub struct Bodies<B> {
-    /// Item by item.
+    /// All bodies, item by item.
     pub all: Vec<B>,
     /// Bounds of each body, f32 relative to `origin`.
     pub bounds: Vec<Aabb>,
-    /// World position of the local zero.
+    /// World position of the local origin.
     pub origin: DVec3,
     /// Number of items.
     ///
-    /// Bodies of higher ids (floors and ceilings of a map) end the search for the first item
-    /// of a ray; picking ignores them otherwise.
+    /// Bodies of higher ids (floors and ceilings of a map) end the search for a ray's first item;
+    /// picking ignores them otherwise.
     pub items: usize,
 }
 
-/// The items of a scene as solid boxes.
+/// Items of a scene as solid boxes.
 pub type Boxes = Bodies<SolidBox>;
 
-/// The triangles of a scene.
+/// Triangles of a scene.
 pub type Facets = Bodies<Facet>;
 
 impl Boxes {
-    /// All solids.
+    /// Bodies of all solids.
     pub fn of(solids: &Solids) -> Boxes {
         let numbered = solids.boxes.iter().zip(0..);
         let all = numbered.map(|(&b, item)| SolidBox { b, item });
         Boxes::some(solids, all.collect())
     }
 
-    /// Some of the solids.
+    /// Bodies of some of the solids.
     pub fn some(solids: &Solids, all: Vec<SolidBox>) -> Boxes {
         let bounds = all.iter().map(|body| solids.outer[body.item as usize]);
         Bodies {
@@ -179,7 +179,7 @@ impl Boxes {
 }
 
 impl Facets {
-    /// All triangles of surfaces; opaque ones hide what is behind them.
+    /// All triangles of surfaces; the opaque ones hide what is behind them.
     pub fn of(surfaces: &Surfaces) -> Facets {
         let of_item = |item: usize| {
             let own = surfaces.of_item[item].clone();
@@ -195,9 +195,9 @@ impl Facets {
         }
     }
 
-    /// The triangles as picking treats them: all of them hide, cut-outs too.
+    /// Triangles as picking treats them: all of them hide, cut-outs too.
     ///
-    /// The first `items` of the surfaces' items count.
+    /// Only the first `items` of the surfaces' items can be picked.
     pub fn solid(surfaces: &Surfaces, items: usize) -> Facets {
         let mut facets = Facets::of(surfaces);
         facets.all.iter_mut().for_each(|facet| facet.hides = true);

@@ -1,6 +1,6 @@
-//! The visible items, exact along the rays of a sample grid.
+//! Visible items, exact along the rays of a sample grid.
 //!
-//! Tests compare it with arithmetic on whole numbers of any length.
+//! Tests compare them with arithmetic on integers of any length.
 
 mod body;
 mod ray_box;
@@ -26,24 +26,23 @@ pub use ray_triangle::{Meeting, TriangleProbe};
 #[cfg(test)]
 pub(super) use tests::{NO_ITEM, fronts, judge, visible_by_random_rays};
 
-/// Items that the rays of a sample grid see: exact for these rays.
+/// Items visible along the rays of a sample grid, exact for these rays.
 ///
-/// The same on any number of threads.
+/// Independent of the number of threads.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct SampleTruth {
-    /// The items that are in front along any ray, ascending; all of a tie are.
+    /// Items in front along any ray, ascending, with every item of a tie.
     pub visible: Vec<ItemId>,
-    /// Along how many rays, for each of `visible`: a tie counts for each.
+    /// Number of rays that see each of `visible`; a tie counts for each of its items.
     pub samples_of: Vec<u32>,
 }
 
 impl SampleTruth {
-    /// Follows every ray through a scene of bodies with holes.
+    /// Traces every ray of a grid through bodies with holes.
     ///
-    /// O(samples * log n) in common scenes.
-    /// `visible` has items that hide and what is met before them.
-    /// A ray ends at the first body that is opaque where the ray meets it. `None`, early, if
-    /// `samples_of` would add up to more than `most`.
+    /// O(samples * log n) in common scenes. A ray ends at the first hiding body that is opaque
+    /// where the ray meets it; bodies that hide nothing and are met before count as visible too.
+    /// `None`, early, if the sum of `samples_of` would exceed `most`.
     pub fn of_opaque<B: Body>(
         index: &BodyIndex<B>,
         is_opaque: &(impl Fn(&B, &B::Probe, &B::At) -> bool + Sync),

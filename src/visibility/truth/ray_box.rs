@@ -1,4 +1,4 @@
-//! Exact entry of a ray into a box: in f64 with an error bound, else by expansions.
+//! Exact entry of a ray into a box: f64 with an error bound, else expansions.
 
 use std::cmp::Ordering;
 
@@ -8,10 +8,11 @@ use crate::kernel::each;
 use crate::scene::WorldBox;
 use crate::visibility::Ray;
 
-/// Relative error of a rounded depth, with room to spare: `(plane - origin)`, the
-/// reciprocal of the direction and their product each round by at most 2^-53, so
-/// the depth is true to 3.01 * 2^-53 of itself; `x + GUARD * |x|` and the like round
-/// once or twice more. 8 * 2^-53 is above their sum.
+/// Bound of the relative error of a rounded depth.
+///
+/// `(plane - origin)`, the reciprocal of the direction and their product each round by at most
+/// 2^-53, so the depth is accurate to 3.01 * 2^-53 of itself; `x + GUARD * |x|` and similar terms
+/// round once or twice more. 8 * 2^-53 exceeds the sum.
 const GUARD: f64 = 8.0 / (1u64 << 53) as f64;
 
 /// Returns `true` if the rounded depths prove that the true ones differ.
@@ -20,27 +21,27 @@ fn apart(a: f64, b: f64) -> bool {
     (a - b).abs() > GUARD * (a.abs() + b.abs())
 }
 
-/// Crossing of a ray and a plane across an axis. Its true depth is the fraction
-/// `(plane - origin[axis]) / direction[axis]`.
+/// Crossing of a ray and a plane across an axis.
+///
+/// The true depth is the fraction `(plane - origin[axis]) / direction[axis]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Crossing {
-    /// Depth in f64, true to 2^-50 of itself.
+    /// Depth in f64, accurate to 2^-50 of itself.
     pub depth: f64,
-    /// The bound of the box that is crossed there, world coordinate.
+    /// Bound of the box that is crossed, in world coordinates.
     pub plane: f64,
-    /// The axis that the plane is across.
+    /// Axis that the plane is perpendicular to.
     pub axis: usize,
 }
 
-/// A ray prepared for exact tests against boxes.
+/// Ray prepared for exact tests against boxes.
 ///
-/// Exact for coordinates and components of direction that are 0 or from 2^-400 to
-/// 2^400 in size.
+/// Exact for coordinates and direction components that are 0 or from 2^-400 to 2^400 in size.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    /// The ray as it was given.
+    /// The ray as given.
     pub ray: Ray,
-    /// Infinite where the direction's component is zero, and not used there.
+    /// Reciprocal direction; infinite, and unused, where the component is zero.
     inverse: [f64; 3],
 }
 
@@ -87,8 +88,8 @@ impl Probe {
 
     /// Entry of the ray into the closed box, if that is from near to far.
     ///
-    /// This is the truth of [`Solids`](crate::visibility::Solids). `None` as well if the ray
-    /// certainly enters beyond `limit`.
+    /// This is the truth of [`Solids`](crate::visibility::Solids). Also `None` if the ray certainly
+    /// enters beyond `limit`.
     #[inline]
     pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<Crossing> {
         let ray = &self.ray;
@@ -109,8 +110,8 @@ impl Probe {
             first = first.max(entries[axis]);
             last = last.min(exits[axis]);
         }
-        // x -> x + GUARD |x| grows with x: what holds for the largest rounded entry
-        // holds for the true one, and likewise for the least exit.
+        // x -> x + GUARD |x| is monotone, so a bound of the largest rounded entry also bounds the
+        // largest true one; the same holds for the least exit.
         let slack = |x: f64| GUARD * x.abs();
         let (enters_from, enters_to) = (first - slack(first), first + slack(first));
         let leaves_from = last - slack(last);
@@ -121,7 +122,7 @@ impl Probe {
         {
             return None;
         }
-        // The last entry is beyond doubt nearly always.
+        // The rounded depths nearly always decide which entry is the last.
         let mut latest = 0;
         for axis in 1..3 {
             latest = if entries[axis] > entries[latest] {
@@ -147,7 +148,7 @@ impl Probe {
         Some(enters)
     }
 
-    /// The bound of a box that the ray crosses first along an axis it moves along.
+    /// Bound of a box that the ray crosses first on an axis along which it moves.
     #[inline(always)]
     fn entered(&self, b: &WorldBox, axis: usize) -> f64 {
         match self.ray.direction[axis] > 0.0 {
@@ -156,12 +157,12 @@ impl Probe {
         }
     }
 
-    /// The axes along which the ray crosses anything.
+    /// Axes along which the ray moves.
     fn crossed(&self) -> impl Iterator<Item = usize> {
         (0..3).filter(|&axis| self.ray.direction[axis] != 0.0)
     }
 
-    /// The last entry into the slabs of a box, exactly; `None` without a direction.
+    /// Last entry into the slabs of a box, exact; `None` for a zero direction.
     #[cold]
     fn latest_entry(&self, b: &WorldBox) -> Option<Crossing> {
         let entry = |axis| self.crossing(axis, self.entered(b, axis));
@@ -180,7 +181,7 @@ impl Probe {
         })
     }
 
-    /// `N_a / d_a` against `N_b / d_b`, multiplied by both `d`.
+    /// Compares `N_a / d_a` with `N_b / d_b`, both multiplied by `d_a d_b`.
     #[cold]
     fn compare_exactly(&self, a: &Crossing, b: &Crossing) -> Ordering {
         let direction = &self.ray.direction;
@@ -195,7 +196,7 @@ impl Probe {
         }
     }
 
-    /// A crossing against a depth, exactly.
+    /// Compares a crossing with a depth, exactly.
     fn compare_with(&self, a: &Crossing, depth: f64) -> Ordering {
         if depth.is_infinite() {
             return 0.0_f64.total_cmp(&depth);
@@ -206,7 +207,7 @@ impl Probe {
         if d > 0.0 { order } else { order.reverse() }
     }
 
-    /// `plane - origin`, exactly.
+    /// Computes `plane - origin` exactly.
     fn numerator(&self, a: &Crossing) -> Expansion {
         Expansion::sum([a.plane, -self.ray.origin[a.axis]])
     }
@@ -260,7 +261,7 @@ mod tests {
             for axis in 0..3 {
                 let entry = probe.crossing(axis, b.min[axis]);
                 assert!(probe.compare(&enters, &entry).is_ge(), "{ray:?} {b:?}");
-                // In f64 it looks the other way round.
+                // The f64 depths have the opposite order.
                 close += usize::from(entry.depth > enters.depth);
             }
         }

@@ -1,4 +1,4 @@
-//! Exact search along a ray, with bodies under a tree of nodes of sixteen.
+//! Exact ray search over bodies in a tree of sixteen-wide nodes.
 
 use std::cmp::Ordering;
 
@@ -11,17 +11,17 @@ use crate::query::ItemId;
 use crate::scene::Surfaces;
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
-/// A body in one cache line.
+/// A body padded to cache lines.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Padded<B>(B);
 
-/// Bodies under a tree: some 45 bytes of nodes and 64 of the body itself per body.
+/// Bodies in a tree: some 45 bytes of nodes and 64 of the body itself per body.
 #[derive(Clone, Debug)]
 pub struct BodyIndex<B> {
-    /// The bounds of the bodies.
+    /// Tree over the bounds of the bodies.
     pub(in crate::visibility) tree: RayTree,
-    /// In tree order.
+    /// Bodies in tree order.
     bodies: Vec<Padded<B>>,
     /// Number of items, see [`Bodies::items`].
     pub(in crate::visibility) items: usize,
@@ -29,23 +29,24 @@ pub struct BodyIndex<B> {
     pub(in crate::visibility) kernel: Kernel,
 }
 
-/// An index of solid boxes.
+/// Index of solid boxes.
 pub type RayIndex = BodyIndex<SolidBox>;
 
-/// An index of triangles. Clear ones and cut-outs hide nothing.
+/// Index of triangles; clear ones and cut-outs hide nothing.
 pub type SurfaceIndex = BodyIndex<Facet>;
 
-/// The items that are seen along a ray; its memory serves for many.
+/// Items visible along a ray; its memory is reused from ray to ray.
 #[derive(Clone, Debug)]
 pub struct Front<At> {
-    /// Bodies that hide nothing, where the ray meets them.
+    /// Meetings with bodies that hide nothing.
     through: Vec<(ItemId, At)>,
-    /// Items that the ray meets first among those that hide, ascending.
+    /// Hiding items that the ray meets first, ascending.
     ///
-    /// Several are a tie. Empty if the ray meets none from near to far.
+    /// More than one is a tie. Empty if the ray meets none from near to far.
     pub front: Vec<ItemId>,
-    /// Others of which a triangle that hides nothing is met before these or with them,
-    /// ascending.
+    /// Other items seen in front of these or at the same depth, ascending.
+    ///
+    /// The ray meets one of their triangles that hide nothing.
     pub before: Vec<ItemId>,
     /// Point where the ray meets the front items.
     pub meeting: Option<At>,
@@ -66,7 +67,7 @@ impl SurfaceIndex {
 }
 
 impl<B: Body> BodyIndex<B> {
-    /// Builds the index, whose answers are those of any `kernel`. O(n log n).
+    /// Builds the index. O(n log n). Its answers do not depend on the `kernel`.
     pub fn of(bodies: &Bodies<B>, kernel: Kernel) -> BodyIndex<B> {
         let (tree, ids) = RayTree::of(&bodies.bounds, bodies.origin);
         let padded = ids.iter().map(|&id| Padded(bodies.all[id as usize]));
@@ -84,23 +85,23 @@ impl<B: Body> BodyIndex<B> {
         B::probe(ray, self.tree.zero)
     }
 
-    /// Shows each body that a ray may meet to a visitor, nearest nodes first.
+    /// Calls `visitor` for each body that the ray may meet, nearest nodes first.
     #[inline]
     pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
-        // It costs less than preparing the ray for the nodes.
+        // Cheaper than preparing the ray for the nodes.
         if !misses(ray, self.tree.zero, &self.tree.bounds) {
             self.kernel.run(Walk(self, ray, visitor));
         }
     }
 
-    /// Searches for what is seen along a ray, exactly.
+    /// Finds the items visible along a ray, exactly.
     pub fn front_of(&self, ray: &Ray) -> Front<B::At> {
         let mut front = Front::new();
         front.search(self, ray, &|_, _, _| true);
         front
     }
 
-    /// Least number of tests of bodies by the rays to all samples of a grid.
+    /// Minimum number of body tests for the rays of all samples of a grid.
     pub fn tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
         let mut tests = 0;
         for ray in rays.of_grid(grid) {
@@ -114,7 +115,7 @@ impl<B: Body> BodyIndex<B> {
         tests
     }
 
-    /// Every meeting of a ray with a body that hides, from near to far, in no order.
+    /// All meetings of a ray with hiding bodies from near to far, unordered.
     pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, B::At)> {
         let probe = self.probe(ray);
         let mut met = Vec::new();
@@ -128,9 +129,9 @@ impl<B: Body> BodyIndex<B> {
     }
 }
 
-/// A search that decides bodies one by one, exactly.
+/// A search that tests bodies one by one, exactly.
 pub trait Visit<B> {
-    /// Decides a body; returns the depth beyond which no further one is wanted.
+    /// Tests a body; returns the depth beyond which no further body is needed.
     fn visit(&mut self, body: &B) -> f64;
 }
 
@@ -177,9 +178,9 @@ impl<At: Copy> Front<At> {
         }
     }
 
-    /// Replaces what is seen along the last ray.
+    /// Replaces the result by the items visible along `ray`.
     ///
-    /// Rays pass through points of bodies that are not `is_opaque`.
+    /// The ray passes through a point of a hiding body that is not `is_opaque`.
     #[inline]
     pub(super) fn search<B: Body<At = At>>(
         &mut self,

@@ -1,9 +1,9 @@
-//! The sixteen-wide tree: sixteen slab tests at once, nearest children first.
+//! Sixteen-wide bounding volume hierarchy: 16 slab tests at once, nearest first.
 //!
-//! It holds the bounds of bodies. The exact tests of the bodies decide what the slab tests in
-//! f32 leave open. It is made from the root down: the set of each node is cut by the surface
-//! area heuristic (16 bins per axis; Wald 2007, "On fast construction of SAH-based bounding
-//! volume hierarchies") until it has sixteen parts.
+//! It holds the bounds of bodies. The exact tests of the bodies decide what the slab tests in f32
+//! leave open. Built top-down: the set of each node is split by the surface area heuristic (16 bins
+//! per axis; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies") until it
+//! has sixteen parts.
 
 use std::hint::black_box;
 use std::mem::swap;
@@ -19,26 +19,26 @@ use crate::kernel::{Isa, LANES, LaneMask};
 use crate::query::{Bits, ItemId};
 use crate::visibility::Ray;
 
-/// The nodes, some 45 bytes of them a box.
+/// Tree over boxes; its nodes take some 45 bytes per box.
 #[derive(Clone, Debug)]
 pub struct RayTree {
     nodes: Vec<Node>,
     root: Child,
-    /// World position of the zero of the nodes.
+    /// World position of the nodes' origin.
     pub zero: DVec3,
     /// Bounds of all boxes.
     pub bounds: Aabb,
 }
 
 impl RayTree {
-    /// Builds the tree over boxes relative to a zero. O(n log n).
+    /// Builds the tree over boxes relative to `zero`. O(n log n).
     ///
-    /// Returns their ids in tree order; searches offer positions in these.
+    /// Returns their ids in tree order too; searches report positions in this order.
     pub fn of(boxes: &[Aabb], zero: DVec3) -> (RayTree, Vec<ItemId>) {
         let mut items = Record::numbered(boxes);
         let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
         let mut root = Child::new(0, 0);
-        // Nodes and lanes that the number of the node goes to.
+        // Parts to split, each with the node and lane that refers to it.
         let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
         if !items.is_empty() {
             open.push((Part::of(&items, 0..items.len()), None));
@@ -75,9 +75,10 @@ impl RayTree {
         (tree, items.iter().map(|item| item.id).collect())
     }
 
-    /// Offers the place of every item that the ray does not certainly miss, in f64.
+    /// Calls `offer` for every item that the ray may meet, tested in f64.
     ///
-    /// All bodies along the ray, whatever their depth: the slab tests do not cover it.
+    /// For rays outside the analysis of the slab tests: ignores depths, so all bodies along the ray
+    /// are reported.
     pub fn search_in_f64(&self, ray: &Ray, mut offer: impl FnMut(u32)) {
         let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
         while let Some(at) = open.pop() {
@@ -95,13 +96,15 @@ impl RayTree {
         }
     }
 
-    /// Offers every item that the ray can meet no deeper than the bound that the last
-    /// `offer` returned, near ones first as far as the tree tells.
+    /// Calls `offer` for every item that the ray may meet up to a bound.
+    ///
+    /// The bound is the depth that the last `offer` returned. Near items come first as far as the
+    /// tree order permits.
     #[inline(always)]
     pub fn search<I: Isa>(&self, isa: I, slabs: &Slabs, mut offer: impl FnMut(u32) -> f32) {
-        // Behind an opaque pointer, so that each node reads the ray's numbers again, which
-        // AVX-512 does within the instruction that needs them.
-        // Spread over whole vectors ahead of the loop, they are read back from the stack.
+        // The opaque pointer makes each node read the ray's numbers again, which AVX-512 does
+        // within the instruction that needs them. If they were broadcast to vectors ahead of the
+        // loop, they would be read back from the stack.
         let slabs = match I::MANY_REGISTERS {
             true => black_box(slabs),
             false => slabs,
@@ -130,7 +133,7 @@ impl RayTree {
                     let lane = lane as usize % LANES;
                     (-less_entry[lane], node.children[lane])
                 });
-                // The nearest so far is kept out of the stack.
+                // The nearest so far stays off the stack.
                 if let Some(mut next) = nodes.next() {
                     let first = open.used;
                     for mut other in nodes {
@@ -159,13 +162,13 @@ impl RayTree {
     }
 }
 
-/// Returns `true` if a ray certainly misses a box about a zero.
+/// Returns `true` if a ray certainly misses a box relative to `zero`.
 ///
-/// It begins outside and comes no nearer along an axis, or the shadows of its line and of
-/// the box on the plane of two axes are apart (Gottschalk, Lin and Manocha 1996,
-/// "OBBTree", the separating axes that are products of two directions). What is rounded
-/// is below 2^-50 of the largest number here times the direction; 2^-48 of it is added.
-/// No product overflows or underflows for numbers that a [`Probe`](super::Probe) takes.
+/// Either the ray starts outside and does not approach the box along some axis, or the projections
+/// of its line and of the box along some axis are disjoint (Gottschalk, Lin and Manocha 1996,
+/// "OBBTree": the separating axes that are cross products of two directions). Rounding errors are
+/// below 2^-50 of the largest number here times the direction; 2^-48 of it is added. No product
+/// overflows or underflows for numbers that a [`Probe`](super::Probe) accepts.
 #[inline(always)]
 pub fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     let start = ray.origin - zero;
@@ -186,13 +189,13 @@ pub fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     turned.cmpgt(cross_sizes(half, d.abs())).any()
 }
 
-/// Nodes still to be visited, the nearest of each node's children last.
+/// Nodes still to be visited, the nearest child of each node on top.
 impl Stack<(f32, u32)> {
-    /// Adds a node to those from `first` on, which are sorted.
+    /// Inserts a node among those from `first` on, which are sorted.
     #[inline(always)]
     fn push_sorted(&mut self, first: usize, node: (f32, u32)) {
         if self.used == NEAR {
-            // Out of order, which costs time only.
+            // Out of order, which only costs time.
             self.far.push(node);
             return;
         }
@@ -206,17 +209,18 @@ impl Stack<(f32, u32)> {
     }
 }
 
-/// Sixteen boxes: items in the first lanes, nodes in those behind. 448 bytes.
+/// Sixteen boxes: items in the first lanes, nodes in the others. 448 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Node {
     boxes: BoxBlock,
-    /// Places of items in tree order, nodes as [`Child`]; of unused lanes any.
+    /// Tree positions of items; nodes as [`Child`]; arbitrary in unused lanes.
     children: [u32; LANES],
 }
 
-/// A node's number and how many of its first lanes hold items, in 27 and 5 bits:
-/// known before the node is read.
+/// Node number (27 bits) and number of its item lanes (5 bits).
+///
+/// The number of item lanes is thus available before the node is read.
 #[derive(Clone, Copy, Debug)]
 struct Child(u32);
 
@@ -233,16 +237,17 @@ impl Child {
         (self.0 >> 5) as usize
     }
 
-    /// The lanes of items.
+    /// Lanes of items.
     #[inline(always)]
     fn items(self) -> LaneMask {
         ((1u32 << (self.0 & 31)) - 1) as LaneMask
     }
 }
 
-/// Cuts a set into at most sixteen parts: the one with the largest surface
-/// first, as long as there is one that does not fit a node; then small ones into
-/// single items, as many as there are lanes left for.
+/// Splits a set into at most sixteen parts.
+///
+/// Splits the part with the largest surface first, as long as some part does not fit a node; then
+/// splits the smallest parts into single items, as many as there are lanes left for.
 fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     let mut parts = vec![part];
     while parts.len() < LANES {
@@ -255,7 +260,7 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
             break;
         };
         let part = parts.swap_remove(largest);
-        // By halves where no cut parts the centres.
+        // Split in the middle if no plane separates the centres.
         let cut = by_surface_area(&mut items[part.range.clone()]);
         let middle = part.range.start + cut.map_or(part.len() / 2, |(_, below)| below);
         parts.push(Part::of(items, part.range.start..middle));
@@ -273,7 +278,7 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     parts
 }
 
-/// A part of the items and its bounds.
+/// Range of the items with its bounds.
 struct Part {
     range: Range<usize>,
     bounds: Aabb,

@@ -1,8 +1,8 @@
-//! Exact meeting of a ray and a triangle: f64 with an error bound, else expansions.
+//! Exact ray-triangle intersection: f64 with an error bound, else expansions.
 //!
-//! Triangles are closed: a ray through a common edge or corner meets all triangles that share
-//! it and slips between none. A ray in its plane does not meet a triangle (nothing of it is
-//! seen), and no ray meets a triangle without area.
+//! Triangles are closed: a ray through a common edge or corner meets all triangles that share it
+//! and slips between none. A ray does not meet a triangle in whose plane it lies (nothing of the
+//! triangle is seen), and no ray meets a triangle without area.
 
 use std::cmp::Ordering;
 
@@ -39,31 +39,31 @@ const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 /// Meeting of a ray and a triangle.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Meeting {
-    /// The depth in f64; 0 where f64 says nothing of it.
+    /// Depth in f64; 0 where f64 does not determine it.
     pub depth: f64,
-    /// The true depth is within this of it; may be infinite.
+    /// Bound of the error of `depth`; may be infinite.
     pub error: f64,
-    /// The corners of the triangle, as it was given.
+    /// Corners of the triangle, as given.
     pub corners: [Vec3; 3],
 }
 
 impl Meeting {
-    /// No depth at which the ray meets it there is below this.
+    /// Lower bound of the depth at which the ray meets the triangle.
     #[inline]
     pub fn at_least(&self) -> f64 {
         self.depth - self.error
     }
 }
 
-/// A ray prepared for exact tests against triangles.
+/// Ray prepared for exact tests against triangles.
 ///
-/// Exact for coordinates of corners, origins and eyes and components of direction
-/// that are 0 or from 2^-100 to 2^100 in size: products of six of them, of two depths
-/// as fractions, are then within what an expansion holds.
+/// Exact for corners, origins, eyes and direction components that are 0 or from 2^-100 to 2^100 in
+/// size: products of six of them, such as those of two depths as fractions, are then within the
+/// range of an expansion.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleProbe {
     ray: Ray,
-    /// Sum of two that moves a scene-local point to the ray's origin.
+    /// Translation of a scene-local point to the ray's origin: `shift + rest`.
     shift: DVec3,
     rest: DVec3,
     /// Largest coordinate of the direction, and of the shift.
@@ -82,7 +82,7 @@ impl Along for TriangleProbe {
         if Self::at_most(b) < a.at_least() {
             return Ordering::Greater;
         }
-        // Walls of two sides are twice in one plane, which the ray meets once.
+        // Walls of two sides have two triangles in one plane, which the ray meets once.
         if are_in_one_plane(a.corners, b.corners) {
             return Ordering::Equal;
         }
@@ -112,8 +112,8 @@ impl TriangleProbe {
 
     /// Meeting of the ray and a triangle, if that is from near to far.
     ///
-    /// A one-sided triangle is met from its front, where its corners turn counter-clockwise.
-    /// `None` as well if the ray certainly meets it beyond `limit`.
+    /// A one-sided triangle is met from its front only, where its corners turn counter-clockwise.
+    /// Also `None` if the ray certainly meets it beyond `limit`.
     #[inline(always)]
     pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
         let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
@@ -123,12 +123,12 @@ impl TriangleProbe {
         let towards = direction.dot(normal);
         let size = u.abs().max(v.abs()).max_element();
         let towards_off = 64.0 * UNIT * self.across * size * size;
-        // Back-facing, as about half of the triangles of a closed mesh are.
+        // Back-facing, like about half of the triangles of a closed mesh.
         if !two_sided && towards > towards_off {
             return None;
         }
-        // Twice the signed volumes of the direction with each edge: of one sign where
-        // the ray passes within, and below zero for one from the front.
+        // Twice the signed volumes of the direction with each edge: all of one sign if the ray
+        // passes inside, and negative if it comes from the front.
         let turned = direction.cross(at);
         let (ab, ca) = (u.dot(turned), -v.dot(turned));
         let bc = towards - ab - ca;
@@ -177,7 +177,7 @@ impl TriangleProbe {
         difference.sign().cmp(&0)
     }
 
-    /// A meeting against a depth, exactly.
+    /// Compares a meeting with a depth, exactly.
     #[cold]
     fn compare_with(&self, a: &Meeting, depth: f64) -> Ordering {
         if depth.is_infinite() {
@@ -204,7 +204,7 @@ impl TriangleProbe {
         }
     }
 
-    /// The depth as a fraction, A . N over d . N, the latter made positive.
+    /// Depth as a fraction, A . N over d . N, with a positive denominator.
     fn fraction(&self, corners: [Vec3; 3]) -> (Expansion, Expansion) {
         let normal = exact_normal(corners);
         let above = exact::dot(&self.about(corners[0]), &normal);
@@ -215,7 +215,7 @@ impl TriangleProbe {
         }
     }
 
-    /// A scene-local point about the ray's origin.
+    /// Scene-local point relative to the ray's origin.
     fn about(&self, p: Vec3) -> ExactVector {
         [0, 1, 2].map(|k| Expansion::sum([self.rest[k], self.shift[k], p[k].into()]))
     }
@@ -223,7 +223,7 @@ impl TriangleProbe {
 
 /// Returns `true` if the second triangle is in the first one's plane.
 ///
-/// `false` as well if their coordinates are no integers of 36 bits in any unit.
+/// Also `false` if their coordinates are not integers of 36 bits in some common unit.
 fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     if a == b {
         return true;
@@ -231,7 +231,7 @@ fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     const BITS: i32 = 36;
     let corners = [a[0], a[1], a[2], b[0], b[1], b[2]];
     let largest = corners.iter().fold(Vec3::ZERO, |most, p| most.max(p.abs()));
-    // Above the largest: no more than one in units of it.
+    // Unit such that all coordinates are at most one.
     let above = libm::frexp(f64::from(largest.max_element())).1;
     let scale = libm::ldexp(1.0, BITS - above);
     let mut integers = [I64Vec3::ZERO; 6];
@@ -244,7 +244,7 @@ fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
         *at = rounded;
     }
     let [a, b, c, p, q, r] = integers;
-    // Sides of 37 bits, products of two sums of 75, of three 114.
+    // Sides have 37 bits, products of two sums 75, of three 114.
     let (u, v) = (b - a, c - a);
     let of_two = |i: usize, j: usize| {
         i128::from(u[i]) * i128::from(v[j]) - i128::from(u[j]) * i128::from(v[i])
@@ -288,7 +288,7 @@ mod tests {
         };
         assert!(met(below, f64::INFINITY) && !met(above, f64::INFINITY));
         assert!(met(0.0, above) && !met(0.0, below));
-        // A depth that is a double is met by both.
+        // A depth that is a double is met even if near and far equal it.
         let twice = ACROSS.map(|p| p * 1.5);
         let probe = TriangleProbe::new(ray(0.5, 0.5), DVec3::ZERO);
         assert!(probe.meet(twice, false, f64::INFINITY).is_some());
@@ -304,10 +304,10 @@ mod tests {
             ([a, c, b], true, true),
             ([a, a, b], true, false),
         ] {
-            // Through the middle, a corner, and an edge.
+            // Through the centre, a corner, and an edge.
             for at in [Vec3::ZERO, a, (a + b) * 0.5] {
                 let off = Vec3::new(0.0, at.y, at.z);
-                // So small a triangle is beyond what f64 decides.
+                // The smaller triangle is beyond what f64 decides.
                 for size in [1.0, 2f32.powi(-70)] {
                     let corners = corners.map(|p| (p - off) * Vec3::new(1.0, size, size));
                     let found = probe.meet(corners, two_sided, f64::INFINITY);
@@ -317,9 +317,9 @@ mod tests {
         }
     }
 
-    /// Rays in the plane of a triangle but for rounding.
+    /// Rays in the plane of a triangle except for rounding.
     ///
-    /// Only the exact sign tells from which side they come.
+    /// Only the exact sign shows from which side they come.
     #[test]
     fn grazing_rays_hit_a_one_sided_triangle_only_from_its_front() {
         let mut rng = SeededRng::new(29);

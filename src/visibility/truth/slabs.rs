@@ -1,35 +1,32 @@
-//! A ray as the sixteen-fold slab tests take it: in f32.
+//! Slab tests of a ray against sixteen boxes in f32, with the error analysis.
 //!
-//! Numbers bound its depths from both sides. It owns the error analysis.
+//! Per-ray constants bound the depths of entry and exit from both sides.
 //!
-//! A box side `b` (f32, local) is crossed at `t = (s - o) / d`, where `s` is the
-//! true side, within 2^-23 `|b|` of `b` (the box was rounded outward by less than
-//! one unit in the last place), `o` the ray's origin, both about the zero of the
-//! tree, and `d` the component of the direction. Computed is
-//! `fl(fl(b * i) + c)` with `i` the f32 next to `1 / d` and `c` near `-o * i`,
-//! taken in f64. With u = 2^-24 the errors are at most, in units of `u * |i|`:
+//! A box side `b` (f32, local) is crossed at `t = (s - o) / d`. Here `s` is the true side, within
+//! 2^-23 `|b|` of `b` (the box was rounded outward by less than one unit in the last place), `o`
+//! the ray's origin, both relative to the origin of the tree, and `d` the component of the
+//! direction. The code computes `fl(fl(b * i) + c)` with `i` the f32 next to `1 / d` and `c` near
+//! `-o * i`, computed in f64. With u = 2^-24 the errors are at most, in units of `u * |i|`:
 //!
 //! - the inverse, `|b - o|` off by one part in 2^24: 1.01 (|b| + |o|)
 //! - the product: |b|
 //! - the sum: |b| + |o| + slack
 //! - the rounding of the box: 2 |b|
-//! - `c` less or plus the slack, rounded to f32: |o| + slack
+//! - `c` minus or plus the slack, rounded to f32: |o| + slack
 //! - `o` and `c` in f64: far below 0.1 |o|
 //!
-//! together 5.01 |b| + 3.1 |o| and two roundings of the slack, which
-//! `6 R + 4 |o| + 2^-80` exceeds for all `|b| <= R` (2^-80 is above all that
-//! underflows). So `t` lies between the values that are computed with `c` less and
-//! plus this slack. What is computed for one box is monotone in its sides, so a
-//! node's bounds bound those of its items. (Nothing here is rounded by a branch on
-//! its sign or size: those cost more than the test of a node.)
+//! Together they are 5.01 |b| + 3.1 |o| and two roundings of the slack, which `6 R + 4 |o| + 2^-80`
+//! exceeds for all `|b| <= R` (2^-80 exceeds all underflow). So `t` lies between the values
+//! computed with `c` minus and plus this slack. The computation is monotone in the sides of a box,
+//! so a node's bounds bound those of its items. (No rounding direction is chosen by a branch on
+//! sign or size: such branches cost more than the test of a node.)
 //!
-//! An axis along which the ray moves by less than 2^-80 per unit of depth is
-//! taken as one with the inverse 2^64 and at least 2^44 of slack: all depths at
-//! which such a ray can meet a box are below 2^40 (one component of the direction
-//! is 1/4 or more and all lengths are at most 2^36), by which it moves less than
-//! 2^-40 along that axis. The origin lies between the sides of a box that such a
-//! ray meets (but for that), so the lower bound of entry comes out below -2^43
-//! and the upper one of exit above 2^43: neither rejects it.
+//! An axis along which the ray moves by less than 2^-80 per unit of depth gets the inverse 2^64 and
+//! at least 2^44 of slack. All depths at which such a ray can meet a box are below 2^40 (one
+//! component of the direction is 1/4 or more and all lengths are at most 2^36), so it moves less
+//! than 2^-40 along that axis. If such a ray meets a box, its origin lies between the box's sides,
+//! up to that distance, so the lower bound of entry comes out below -2^43 and the upper bound of
+//! exit above 2^43: neither rejects the box.
 
 use glam::{DVec3, Vec3};
 
@@ -38,16 +35,16 @@ use crate::visibility::Ray;
 
 /// Largest coordinate for which the analysis holds.
 const MOST_REACH: f64 = (1u64 << 36) as f64;
-/// Components of a direction below this are taken as zero.
+/// Direction components below this count as zero.
 const LEAST_ALONG: f64 = 1.0 / (1u128 << 80) as f64;
-/// The inverse of such a component.
+/// Reciprocal used for such a component.
 const INVERSE_OF_NONE: f32 = (1u128 << 64) as f32;
-/// The slack of such an axis, at least.
+/// Least slack of such an axis.
 const SLACK_OF_NONE: f64 = (1u64 << 44) as f64;
 
-/// The f32 above a depth.
+/// Upper bound of a depth as an f32.
 ///
-/// One part in 2^24 is lost when it is rounded, and less than 1e-37 where it underflows.
+/// The margin covers the rounding (one part in 2^24) and, on underflow, less than 1e-37.
 #[inline(always)]
 pub fn above(depth: f64) -> f32 {
     (depth + (depth.abs() * f64::from(f32::EPSILON) + 1e-37)) as f32
@@ -56,36 +53,36 @@ pub fn above(depth: f64) -> f32 {
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z.
 pub type Rows = [[f32; LANES]; 6];
 
-/// A ray's numbers for the slab test.
+/// Constants of a ray for the slab test.
 #[derive(Clone, Copy, Debug)]
 pub struct Slabs {
-    /// Which row is crossed first, and which last, on each axis.
+    /// Rows that are crossed first and last, by axis.
     first: [usize; 3],
     last: [usize; 3],
     inverse: [f32; 3],
-    /// `c` less and plus the slack.
+    /// `c` minus and plus the slack.
     low: [f32; 3],
     high: [f32; 3],
-    /// Near and far, rounded down and up.
+    /// Near, rounded down, and far, rounded up.
     near: f32,
     pub far: f32,
 }
 
 /// Result of the test of sixteen boxes.
 pub struct Tested<I: Isa> {
-    /// Those that the ray can meet.
+    /// Lanes of the boxes that the ray may meet.
     pub lanes: LaneMask,
-    /// Less the least depth at which it can enter each.
+    /// Lower bound of the depth of entry into each box, negated.
     pub less_entry: I::Floats,
 }
 
 impl Slabs {
-    /// `None` for a ray that the analysis does not cover.
+    /// Prepares a ray; `None` for a ray that the analysis does not cover.
     #[inline(always)]
     pub fn of(ray: &Ray, zero: DVec3, reach: Vec3) -> Option<Slabs> {
         let start = ray.origin - zero;
         let largest = ray.direction.abs().max_element();
-        // Written so that no NaN passes.
+        // Written so that a NaN fails.
         let covered = start.abs().max_element() <= MOST_REACH
             && f64::from(reach.max_element()) <= MOST_REACH
             && (0.25..=1024.0).contains(&largest)
@@ -125,7 +122,7 @@ impl Slabs {
         Some(slabs)
     }
 
-    /// The boxes that the ray can meet no deeper than `most`.
+    /// Boxes that the ray may meet at a depth of `most` or less.
     #[inline(always)]
     pub fn test<I: Isa>(&self, isa: I, rows: &Rows, most: f32) -> Tested<I> {
         let entry = |axis: usize| {
@@ -142,7 +139,7 @@ impl Slabs {
         let exit = isa.min(isa.min(exit(0), exit(1)), isa.min(exit(2), isa.splat(most)));
         let less_first = isa.min(less_entry, isa.splat(-self.near));
         Tested {
-            // A sum has the sign of the true one.
+            // A rounded sum has the sign of the true one.
             lanes: isa.not_below(isa.add(less_first, exit), 0.0),
             less_entry,
         }
