@@ -1,6 +1,6 @@
-//! Graphs of regions that are boxes, such as the rooms of a scene.
+//! Region graphs of boxes, such as the rooms of a scene.
 //!
-//! Solids close their borders.
+//! Solids close the regions' borders.
 
 use std::sync::Arc;
 
@@ -11,12 +11,14 @@ use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 
-/// A ground of boxes, one a region.
+/// Region locator for graphs with one box per region.
 #[derive(Debug)]
 struct Boxes {
     regions: BoxGrid,
-    /// Solids that close their borders. A ray that begins in such a solid is not hidden
-    /// by it, and may continue in every region that the solid meets.
+    /// Solids that close the regions' borders.
+    ///
+    /// A ray that starts inside such a solid is not hidden by it, and may continue in every region
+    /// that the solid meets.
     borders: BoxGrid,
 }
 
@@ -34,12 +36,12 @@ impl Ground for Boxes {
         inside
     }
 
-    /// None: regions are their parts.
+    /// Appends none: each region equals its part.
     fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
 }
 
 impl RegionGraph {
-    /// Regions that are boxes themselves.
+    /// Graph whose regions are boxes.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
         let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
         let ground = Boxes {
@@ -49,9 +51,11 @@ impl RegionGraph {
         RegionGraph::new(regions, openings, Arc::new(ground))
     }
 
-    /// The regions of a scene that is a tiling of boxes whose borders, but for the
-    /// openings, lie in solid items. An opening is flat, as the tiling has it: the wall
-    /// about it has a thickness, so less is seen through it.
+    /// Regions of a scene that is a tiling of boxes.
+    ///
+    /// Except for the openings, the boxes' borders must lie in solid items. An opening is flat, as
+    /// in the tiling; the wall around it has a thickness, so less is seen through it than the graph
+    /// allows.
     ///
     /// `None` for a scene whose regions are not a tiling.
     pub fn of_scene(scene: &Scene) -> Option<RegionGraph> {
@@ -69,8 +73,9 @@ impl RegionGraph {
         Some(graph)
     }
 
-    /// Tests, by item, for a possible border between regions; furniture, which is
-    /// strictly within one box, is none.
+    /// Tests each item for being a possible border between regions.
+    ///
+    /// Furniture, which is strictly inside one box, is none.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.concat());
         let is_border = |item: &Aabb| {
@@ -84,7 +89,7 @@ impl RegionGraph {
         scene.items.iter().map(is_border).collect()
     }
 
-    /// The rooms of a tiling about an origin.
+    /// Rooms of a tiling whose coordinates are relative to `origin`.
     pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
         let world = |b: &Aabb| WorldBox::of(b, origin);
         let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
@@ -100,11 +105,11 @@ impl RegionGraph {
     }
 }
 
-/// A hole without thickness in the border of two boxes, if it is one.
+/// Opening for a flat hole in the common border of two boxes; else `None`.
 fn flat(boxes: &[WorldBox], [a, b]: [RegionId; 2], hole: &WorldBox) -> Option<Opening> {
     let axis = (0..3).find(|&axis| hole.min[axis] == hole.max[axis])?;
     let at = hole.min[axis];
-    // The front is the region that extends to larger coordinates.
+    // The front region extends to larger coordinates.
     let is_front = |&[front, behind]: &[RegionId; 2]| {
         boxes[front as usize].min[axis] == at && boxes[behind as usize].max[axis] == at
     };
@@ -115,7 +120,7 @@ fn flat(boxes: &[WorldBox], [a, b]: [RegionId; 2], hole: &WorldBox) -> Option<Op
     })
 }
 
-/// The faces of a hole with a thickness: a line through a box passes one of them.
+/// Faces of a hole with a thickness: a line through the hole crosses one of them.
 fn thick(sides: [RegionId; 2], hole: &WorldBox) -> Vec<Opening> {
     let faces = (0..3).flat_map(|axis| {
         let mut ends = vec![hole.min[axis], hole.max[axis]];

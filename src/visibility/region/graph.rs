@@ -10,34 +10,36 @@ use crate::visibility::Rays;
 /// Id of a region: its index in the graph.
 pub type RegionId = u32;
 
-/// Finds the regions of a place.
+/// Locator of the regions at a box.
 pub trait Ground: Send + Sync + std::fmt::Debug {
-    /// Appends the regions that a closed box meets (some perhaps twice); `false` if
-    /// part of it may be in none.
+    /// Appends the regions that a closed box meets, some perhaps twice.
+    ///
+    /// Returns `false` if part of the box may be in no region.
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool;
 
-    /// Appends regions that a closed box meets outside of their parts.
+    /// Appends the regions that a closed box meets outside of their parts.
     ///
-    /// All that it meets, as far as the regions differ from their parts or have none.
+    /// The default appends all regions that it meets, for graphs whose regions differ from their
+    /// parts or have none.
     fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
         self.regions_at(b, out);
     }
 }
 
-/// Regions joined by openings: sight leads from one to another through these only.
+/// Graph of regions and openings; lines of sight cross regions only there.
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
-    /// The boxes that together hold each region; one in most graphs.
+    /// Boxes whose union contains each region; one in most graphs.
     pub(super) parts: Vec<Vec<WorldBox>>,
-    /// All openings; an exit is an index in this list.
+    /// All openings; an exit is an index into this list.
     pub openings: Vec<Opening>,
-    /// The openings on the border of each region.
+    /// Openings on the border of each region.
     pub exits: Vec<Vec<u32>>,
     pub(super) ground: Arc<dyn Ground>,
 }
 
 impl RegionGraph {
-    /// Links regions, each with the boxes that hold it, by openings.
+    /// Links regions by openings; `parts` are the boxes that contain each region.
     pub fn new(
         parts: Vec<Vec<WorldBox>>,
         openings: Vec<Opening>,
@@ -63,10 +65,11 @@ impl RegionGraph {
         self.exits.len()
     }
 
-    /// Replaces `homes` by the regions in which rays of the camera begin to see: all
-    /// that are met by the box about the eye and the near window, as what is nearer
-    /// than the near plane hides nothing. `false` if rays may begin in no region, or
-    /// the lens is orthographic.
+    /// Replaces `homes` by the regions in which rays of the camera may start.
+    ///
+    /// These are all regions that meet the bounds of the eye and the near window, as nothing hides
+    /// before the near plane. Returns `false` if rays may start in no region, or the lens is
+    /// orthographic.
     pub fn homes(&self, rays: &Rays, homes: &mut Vec<RegionId>) -> bool {
         homes.clear();
         if rays.camera.lens.is_orthographic() {
@@ -75,7 +78,7 @@ impl RegionGraph {
         let eye = rays.camera.frame.eye;
         let corners = rays.near_corners().into_iter().chain([eye]);
         let WorldBox { min, max } = WorldBox::union_of(corners.map(WorldBox::at));
-        // Corners are rounded, by less than this.
+        // Bound of the rounding of the corners.
         let slack = (eye.abs() + (max - min)) * f64::EPSILON * 8.0;
         let about = WorldBox::new(min - slack, max + slack);
         let inside = self.ground.regions_at(&about, homes);
@@ -85,32 +88,31 @@ impl RegionGraph {
     }
 }
 
-/// The plane of an opening and its front side.
+/// Plane of an opening, with its front side.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum OpeningPlane {
-    /// Across an axis: the front has the larger coordinates.
+    /// Perpendicular to an axis; the front has the larger coordinates.
     Axis {
         /// 0, 1 or 2.
         axis: usize,
         /// Coordinate on the axis, world units.
         at: f64,
     },
-    /// Upright over the line from one point to another: the front is right of it.
+    /// Vertical, over the line between two points; the front is right of the line.
     Upright {
         /// Start of the line, seen from above.
         from: DVec2,
         /// End of the line.
         to: DVec2,
     },
-    /// One face of an opening that has a thickness: passed in both directions.
+    /// One face of an opening that has a thickness: crossed in both directions.
     Undirected,
 }
 
-/// Side of the line from `a` through `b` that the point `c` is on.
+/// Orientation of point `c` to the line from `a` through `b`.
 ///
-/// 1 for the left, -1 for the right, 0 if rounding hides it (Shewchuk 1997, "Adaptive
-/// precision floating-point arithmetic", section 4.2: the bound is the first stage of its
-/// orient2d).
+/// 1 for the left, -1 for the right, 0 if rounding hides it (Shewchuk 1997, "Adaptive precision
+/// floating-point arithmetic", section 4.2: the bound is the first stage of its orient2d).
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
     const BOUND: f64 = 4.0 / (1u64 << 53) as f64;
     let (left, right) = ((a.x - c.x) * (b.y - c.y), (a.y - c.y) * (b.x - c.x));
@@ -119,22 +121,23 @@ fn turn(a: DVec2, b: DVec2, c: DVec2) -> i32 {
     i32::from(determinant > bound) - i32::from(determinant < -bound)
 }
 
-/// An opening, or portal, between two regions: a flat rectangle, upright or level.
+/// Opening (portal) between two regions: a flat rectangle in world coordinates.
 ///
-/// In world coordinates.
+/// It is vertical or horizontal.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Opening {
-    /// The region in front of it and the region behind it.
+    /// Region in front of it and region behind it.
     pub sides: [RegionId; 2],
-    /// The rectangle's corners, in turn; closed.
+    /// Corners of the closed rectangle, in order around it.
     pub corners: [DVec3; 4],
-    /// Its plane.
+    /// Plane of the rectangle.
     pub plane: OpeningPlane,
 }
 
 impl Opening {
-    /// Side of the plane that a point is surely on: 1 in front, -1 behind, 0 on it or
-    /// too close to decide.
+    /// Certain side of the plane that a point is on.
+    ///
+    /// 1 in front, -1 behind, 0 on it or too close to decide.
     pub fn side(&self, p: DVec3) -> i32 {
         match self.plane {
             OpeningPlane::Axis { axis, at } => i32::from(p[axis] > at) - i32::from(p[axis] < at),
@@ -143,8 +146,9 @@ impl Opening {
         }
     }
 
-    /// The region that a line of sight from `eye` enters through this opening out of
-    /// `region`; `None` if it can only leave the other way.
+    /// Region that a line of sight from `eye` enters from `region` through the opening.
+    ///
+    /// `None` if it can only pass the other way.
     pub fn entered(&self, region: RegionId, eye: DVec3) -> Option<RegionId> {
         let [front, behind] = self.sides;
         let side = self.side(eye);
@@ -156,7 +160,7 @@ impl Opening {
     }
 }
 
-/// The corners of a flat rectangle across an axis, in turn.
+/// Corners of a flat rectangle perpendicular to an axis, in order around it.
 pub fn rectangle(axis: usize, min: DVec3, max: DVec3) -> [DVec3; 4] {
     let next = (axis + 1) % 3;
     let mut corners = [min, min, max, max];
@@ -191,7 +195,7 @@ mod tests {
             assert_eq!(opening.entered(3, low), Some(7));
             assert_eq!(opening.entered(7, low), None);
             assert_eq!(opening.entered(5, low), None);
-            // On the plane it is open to both.
+            // A point on the plane sees both regions.
             assert_eq!(opening.entered(7, min), Some(3));
             assert_eq!(opening.entered(3, min), Some(7));
         }

@@ -1,6 +1,6 @@
-//! A uniform grid over boxes that finds those which meet another box.
+//! Uniform grid over boxes, to find those that meet another box.
 //!
-//! For the region of an eye and for the items of a region.
+//! Locates the regions of an eye and the items of a region.
 
 use glam::DVec3;
 
@@ -9,24 +9,24 @@ use crate::index::IdSet;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
-/// A uniform grid of buckets over boxes.
+/// Uniform grid of buckets over boxes.
 #[derive(Clone, Debug)]
 pub struct BoxGrid {
-    /// The boxes, as they were given.
+    /// Boxes in input order.
     pub boxes: Vec<WorldBox>,
     low: DVec3,
     per_unit: DVec3,
     count: [usize; 3],
-    /// The boxes of each bucket.
+    /// Boxes of each bucket.
     buckets: Vec<Vec<u32>>,
 }
 
 impl BoxGrid {
-    /// About as many buckets as boxes. O(n + entries).
+    /// Builds a grid with about as many buckets as boxes. O(n + entries).
     pub fn new(boxes: Vec<WorldBox>) -> BoxGrid {
         let WorldBox { min: low, max } = WorldBox::union_of(boxes.iter().copied());
         let size = (max - low).max(DVec3::ZERO);
-        // Cubes: the edge that gives one bucket for each box.
+        // Cubic cells, sized for about one bucket per box.
         let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
         let edge = libm::cbrt(solid.element_product() / boxes.len().max(1) as f64);
         let count = (solid / edge).to_array();
@@ -34,7 +34,7 @@ impl BoxGrid {
         let mut grid = BoxGrid {
             boxes,
             low,
-            // Infinite along a width of 0, where all boxes lie in the first cell.
+            // Infinite on an axis of width 0, where all boxes lie in the first cell.
             per_unit: DVec3::from(count.map(|cells| cells as f64)) / size,
             count,
             buckets: Vec::new(),
@@ -47,8 +47,9 @@ impl BoxGrid {
         grid
     }
 
-    /// Calls `found` with each box that meets a box, closed; a box that lies in
-    /// several buckets may be named several times.
+    /// Calls `found` with each box that meets a closed box.
+    ///
+    /// A box that lies in several buckets may be reported several times.
     pub fn meeting(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
         let meets = |id: u32| b.meets(&self.boxes[id as usize]);
         self.buckets(b, |bucket| {
@@ -57,11 +58,12 @@ impl BoxGrid {
         });
     }
 
-    /// The bucket's number on an axis. Monotone in `x`, so a box's buckets lie
-    /// between those of its corners, whatever is rounded.
+    /// Bucket index on an axis.
+    ///
+    /// Monotone in `x`, so a box's buckets lie between those of its corners, whatever the rounding.
     fn cell(&self, axis: usize, x: f64) -> usize {
         let at = (x - self.low[axis]) * self.per_unit[axis];
-        // Below zero and NaN become 0.
+        // Negative numbers and NaN become 0.
         (at as usize).min(self.count[axis] - 1)
     }
 
@@ -80,9 +82,10 @@ impl BoxGrid {
 
 /// Tests whether closed boxes cover a box, exactly.
 ///
-/// Cuts it by a box and looks at each part that is left with the boxes that overlap it; those
-/// that only touch it cover nothing of it. Ends at the first part without any. O(n log n) for
-/// the rooms of a grid; O(n^4) at worst, as parts are disjoint boxes between planes of faces.
+/// Subtracts one box and tests each remaining part with the boxes that overlap it; boxes that only
+/// touch the part cover nothing of it. Returns false at the first part without such a box. O(n log
+/// n) for the rooms of a grid; O(n^4) at worst, as parts are disjoint boxes between planes of
+/// faces.
 pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
     let overlap = |part: &WorldBox, other: &WorldBox| {
         let (low, high) = (part.min.max(other.min), part.max.min(other.max));
@@ -102,7 +105,7 @@ pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
     true
 }
 
-/// The part of a box outside another: up to six boxes.
+/// Parts of a box outside another box: up to six boxes.
 pub fn without(b: &WorldBox, other: &WorldBox) -> Vec<WorldBox> {
     if !b.meets(other) {
         return vec![*b];
@@ -120,7 +123,7 @@ pub fn without(b: &WorldBox, other: &WorldBox) -> Vec<WorldBox> {
     parts
 }
 
-/// The items of each region.
+/// Items of each region.
 #[derive(Clone, Debug)]
 pub struct RegionItems {
     lists: Vec<Vec<ItemId>>,
@@ -128,11 +131,12 @@ pub struct RegionItems {
 }
 
 impl RegionItems {
-    /// The items that touch or meet each region; both are closed.
+    /// Items that touch or meet each region; both are closed.
     ///
-    /// An item that touches a region's box is listed, and one that [meets](super::Ground::more_at) the region elsewhere.
-    /// If regions have no height of their own (a map's), boxes of regions are taken
-    /// to extend without end up and down. O(n log n) for items much smaller than regions.
+    /// Contains the items that touch a box of the region and those that
+    /// [meet](super::Ground::more_at) the region elsewhere. If regions have no height of their own
+    /// (those of a map), their boxes extend without end up and down. O(n log n) for items much
+    /// smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
         let owned = (0..).zip(&graph.parts);
         let owners = owned.flat_map(|(region, parts)| parts.iter().map(move |_| region));
@@ -155,13 +159,14 @@ impl RegionItems {
         }
     }
 
-    /// The items that meet a region, ascending.
+    /// Items that meet a region, ascending.
     pub fn of_region(&self, region: RegionId) -> &[ItemId] {
         &self.lists[region as usize]
     }
 
-    /// Replaces `out` by the items of the regions, ascending. All regions together
-    /// are all items. O(items of the regions + n / 64).
+    /// Replaces `out` by the items of the regions, ascending.
+    ///
+    /// If all regions are given, the result is all items. O(items of the regions + n / 64).
     pub fn of_regions(&self, regions: &[RegionId], marks: &mut IdSet, out: &mut Vec<ItemId>) {
         if regions.len() == self.lists.len() {
             out.clear();
@@ -218,7 +223,7 @@ mod tests {
         assert!(!covers(&[], &part(0.1, 0.9)));
     }
 
-    /// Boxes of a grid touch each other, and a box may be cut where they only touch.
+    /// Boxes of a grid touch each other; boxes are also cut where they only touch.
     #[test]
     fn covering_by_thousands_of_small_boxes_ends_at_once() {
         let (mut cells, one) = (Vec::new(), DVec3::ONE);
@@ -240,7 +245,7 @@ mod tests {
         assert!(!covers(&cells, &inner));
     }
 
-    /// Cutting by one box after another is the reference, for flat boxes too.
+    /// The reference subtracts one box after another, for flat boxes too.
     #[test]
     fn covering_is_what_is_left_after_every_cut() {
         let (mut rng, mut covered) = (SeededRng::new(8), 0);

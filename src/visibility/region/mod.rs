@@ -1,14 +1,13 @@
-//! The region stage: the rooms or sectors of a scene that can be seen at all.
+//! Region stage: the rooms or sectors of a scene that may be visible.
 //!
-//! Their items are what remains.
+//! Their items remain.
 //!
-//! A back end ([`BackEnd`]) searches a [`RegionGraph`]: regions and the openings
-//! between them, made from a tiling of rooms or a Doom map.
+//! A back end ([`BackEnd`]) searches a [`RegionGraph`]: regions and the openings between them,
+//! built from a tiling of rooms or a Doom map.
 //!
-//! Sight is defined by regions and openings alone: a line of sight leaves a region
-//! through an opening, and everything else on a region's border is opaque.
-//! Doors are open. Lines that only touch an edge of an opening see nothing; all back
-//! ends list what they touch too.
+//! Visibility is defined by regions and openings alone: a line of sight leaves a region through an
+//! opening, and the rest of a region's border is opaque. Doors are open. Lines that only touch an
+//! edge of an opening see nothing, but all back ends also list the regions that such lines reach.
 
 mod boxes;
 pub mod doom;

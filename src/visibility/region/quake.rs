@@ -1,6 +1,6 @@
 //! Quake III maps: clusters of open leaves as regions.
 //!
-//! Their files have no openings between them; what a cluster sees is a table.
+//! Their files have no openings between clusters; a table lists the clusters visible from each.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::graph::{Ground, RegionGraph, RegionId};
 use super::row::Pvs;
 use crate::scene::{BspChild, QuakeMap, WorldBox};
 
-/// Map units by which boxes are grown: map compilers round corners and planes.
+/// Map units by which boxes are enlarged: map compilers round corners and planes.
 const SLACK: f64 = 0.125;
 
 impl Ground for QuakeMap {
@@ -41,7 +41,7 @@ impl Ground for QuakeMap {
 }
 
 impl RegionGraph {
-    /// The clusters of a map.
+    /// Clusters of a map as regions.
     pub fn of_quake(map: &Arc<QuakeMap>) -> RegionGraph {
         let parts = vec![Vec::new(); map.clusters];
         RegionGraph::new(parts, Vec::new(), map.clone())
@@ -49,9 +49,10 @@ impl RegionGraph {
 }
 
 impl Pvs {
-    /// The table of a map, of what its clusters see.
+    /// Visibility table of the clusters of a map.
     ///
-    /// `None` where the map has none, as all are seen then, or where it is too large.
+    /// `None` if the map has no table, which means that everything is visible, or if the table is
+    /// too large.
     pub fn of_quake(map: &QuakeMap) -> Option<Pvs> {
         Pvs::of_pairs(map.clusters, map.sees()?)
     }

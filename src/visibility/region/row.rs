@@ -1,6 +1,6 @@
-//! The back ends of the region stage: their table, and their answers over a graph.
+//! Back ends of the region stage: their table, and their answers over a graph.
 //!
-//! Pairs of regions that may see each other are a set per region, as a map claims.
+//! The pairs of regions that a map claims to be visible are stored as one set per region.
 
 use super::graph::{RegionGraph, RegionId};
 use super::search::Search;
@@ -9,13 +9,13 @@ use crate::kernel::extend;
 use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, Rays, Row};
 
-/// A potentially visible set: regions seen from each region, itself among them.
+/// Potentially visible set: the regions visible from each region and itself.
 ///
-/// One allocation for each region: reading a row of one table with offsets takes half again
-/// as long.
+/// One allocation per region: reading a row of a single table with offsets takes half again as
+/// long.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pvs {
-    /// Ascending, a row for each region.
+    /// Visible regions of each region, ascending.
     pub rows: Box<[Box<[RegionId]>]>,
 }
 
@@ -23,10 +23,11 @@ pub struct Pvs {
 const MOST_REGIONS: usize = 1 << 16;
 
 impl Pvs {
-    /// The REJECT table of a Doom map: bit `from * sectors + to`, lowest bit of a
-    /// byte first, is 1 where a monster in sector `from` cannot see sector `to`.
+    /// Reads the REJECT table of a Doom map.
     ///
-    /// `None` for fewer bits than pairs of sectors, or too many sectors.
+    /// Bit `from * sectors + to`, least significant bit of a byte first, is 1 if a monster in
+    /// sector `from` cannot see sector `to`. `None` if there are fewer bits than pairs of sectors,
+    /// or too many sectors.
     pub fn from_reject(bytes: &[u8], sectors: usize) -> Option<Pvs> {
         let is_whole = bytes.len() >= sectors.saturating_mul(sectors).div_ceil(8);
         let is_hidden = |from: u32, to: u32| {
@@ -36,7 +37,7 @@ impl Pvs {
         is_whole.then(|| Pvs::of_pairs(sectors, |from, to| !is_hidden(from, to)))?
     }
 
-    /// All pairs of regions that a table has; each region sees itself.
+    /// Set of all pairs that satisfy `sees`; each region sees itself.
     ///
     /// `None` for too many regions.
     pub fn of_pairs(regions: usize, sees: impl Fn(u32, u32) -> bool) -> Option<Pvs> {
@@ -51,16 +52,16 @@ impl Pvs {
         })
     }
 
-    /// The regions that a region sees, ascending.
+    /// Regions visible from a region, ascending.
     pub fn row(&self, from: RegionId) -> &[RegionId] {
         &self.rows[from as usize]
     }
 }
 
-/// A row of the table of back ends.
+/// Row of the table of back ends.
 ///
-/// It tells whether a scene has the regions that it needs. The guarantee is of answers from
-/// an eye in the world of regions and openings (hiding by items aside).
+/// `build` tests whether a scene has the regions that the back end needs. The guarantee is for an
+/// eye in the world of regions and openings (occlusion by items aside).
 pub type BackEnd = Row<fn(&Scene) -> bool>;
 
 /// All back ends of the region stage.
@@ -77,7 +78,7 @@ fn has_sectors(scene: &Scene) -> bool {
     matches!(&scene.regions, Regions::Bsp(map) if map.disputes().is_empty())
 }
 
-/// Memory that queries use again and again.
+/// Memory reused from query to query.
 #[derive(Clone, Default, Debug)]
 pub struct Scratch {
     homes: Vec<RegionId>,
@@ -88,8 +89,9 @@ pub struct Scratch {
 impl RegionGraph {
     /// Replaces `out` by the regions that a camera may see, ascending.
     ///
-    /// Reads stored pairs of as many regions, or searches without them. Returns `false`, with
-    /// all regions in `out`, if the eye is not wholly in regions or the lens is orthographic.
+    /// Reads the stored pairs of `pvs`, for the same number of regions, or searches without them.
+    /// Returns `false`, with all regions in `out`, if the eye is not wholly in regions or the lens
+    /// is orthographic.
     pub fn seen_by(
         &self,
         rays: &Rays,
@@ -127,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_reject_bit_hides_and_bits_run_on_over_rows() {
-        // Bit 1 (0 to 1) and bit 8 (2 to 2, which sees itself all the same).
+        // Bit 1 (0 to 1) and bit 8 (2 to 2; a sector sees itself regardless).
         let pvs = Pvs::from_reject(&[0b10, 0b1], 3).unwrap();
         assert_eq!(pvs.row(0), [0, 2]);
         assert_eq!((pvs.row(1), pvs.row(2)), (&[0, 1, 2][..], &[0, 1, 2][..]));

@@ -1,9 +1,9 @@
-//! A search of the graph from the regions of the eye, through windows.
+//! Portal search from the regions of the eye, through windows.
 //!
-//! A window is the rectangle of the image that an opening covers, intersected with the
-//! window before it (Luebke and Georges 1995, "Portals and mirrors: simple, fast evaluation
-//! of potentially visible sets"). Windows are grown by a slack, so that no rounding ever loses
-//! a line of sight; its proof is at [`SLACK`].
+//! A window is the rectangle of the image that an opening covers, intersected with the window
+//! before it (Luebke and Georges 1995, "Portals and mirrors: simple, fast evaluation of potentially
+//! visible sets"). Windows are enlarged by a slack, so that rounding never loses a line of sight;
+//! its proof is at [`SLACK`].
 
 use glam::DVec3;
 
@@ -13,22 +13,22 @@ use crate::index::IdSet;
 use crate::kernel::each;
 use crate::visibility::Rays;
 
-/// Most different windows of a region; further ones are the whole image.
+/// Most different windows per region; any further one is the whole image.
 ///
-/// Bounds the time where many ways lead to one region.
+/// Bounds the time if many paths lead to one region.
 const MOST_WINDOWS: usize = 32;
 
-/// Memory of a search.
+/// Memory of a search, reused from search to search.
 #[derive(Clone, Default, Debug)]
 pub struct Search {
-    /// All entries of regions through windows, in the order of the search.
+    /// Entered regions with their windows, in search order.
     entries: Vec<(RegionId, Window)>,
-    /// The windows of each region that is seen.
+    /// Windows of each visible region.
     windows: Vec<Vec<Window>>,
 }
 
 impl Search {
-    /// Adds the regions that are seen from those of the eye, these among them.
+    /// Adds the regions visible from the regions of the eye, including these.
     pub fn run(&mut self, graph: &RegionGraph, rays: &Rays, homes: &[RegionId], seen: &mut IdSet) {
         self.entries.clear();
         let regions = graph.len().max(self.windows.len());
@@ -61,7 +61,7 @@ impl Search {
         }
     }
 
-    /// Tests whether an earlier window of a region holds a window.
+    /// Marks a region as seen; tests whether an earlier window contains this one.
     fn is_entered(&mut self, seen: &mut IdSet, region: RegionId, window: Window) -> bool {
         let earlier = &mut self.windows[region as usize];
         if seen.insert(region) {
@@ -76,7 +76,7 @@ impl Search {
     }
 }
 
-/// The common part of two windows; `None` if they do not meet.
+/// Intersection of two windows; `None` if they do not meet.
 fn common([x0, x1, y0, y1]: Window, [left, right, bottom, top]: Window) -> Option<Window> {
     let both = [x0.max(left), x1.min(right), y0.max(bottom), y1.min(top)];
     (both[0] <= both[1] && both[2] <= both[3]).then_some(both)
@@ -86,7 +86,7 @@ fn is_within(inner: Window, outer: Window) -> bool {
     outer[0] <= inner[0] && inner[1] <= outer[1] && outer[2] <= inner[2] && inner[3] <= outer[3]
 }
 
-/// A part of the image: left, right, bottom, top, slopes per unit of depth.
+/// Rectangle of the image: left, right, bottom, top, slopes per unit of depth.
 type Window = [f64; 4];
 
 /// Distance within which a point outside of a half-space `n . x >= 0` is kept.
@@ -95,18 +95,18 @@ type Window = [f64; 4];
 ///
 /// The errors to cover, with u = 2^-53 and X = |x|:
 /// - A corner minus the eye is rounded by u relative; three products and two sums
-///   with axes whose coordinates are at most 1 add 3 u X a coordinate: below 2^-49 X.
-/// - A ray of the camera is `u a + v b + forward`, rounded: u relative an operation,
+///   with axes whose coordinates are at most 1 add 3 u X per coordinate: below 2^-49 X.
+/// - A ray of the camera is `u a + v b + forward`, rounded: u relative per operation,
 ///   and the axes are orthonormal to 2^-50: below 2^-48 X.
 /// - The product of a corner with a normal adds below 2^-50 |n| X.
 ///
-/// The sum is far below the 2^-36 |n| X that thresholds are shifted by.
+/// Thresholds are shifted by 2^-36 |n| X, far more than the sum.
 const SLACK: f64 = 1.0 / (1u64 << 36) as f64;
 
-/// The smallest window that surely holds an opening, grown by the slack.
+/// Smallest window that certainly contains an opening, enlarged by the slack.
 ///
-/// `None` if it is surely not in the image, or beyond the far plane. All rays share an eye:
-/// the lens is not orthographic.
+/// `None` if the opening is certainly not in the image, or beyond the far plane. All rays must
+/// share an eye: the lens is not orthographic.
 fn window_of(rays: &Rays, opening: &Opening) -> Option<Window> {
     let Camera { frame, lens } = &rays.camera;
     let axes = [frame.u(), frame.v(), frame.forward()];
@@ -123,7 +123,7 @@ fn window_of(rays: &Rays, opening: &Opening) -> Option<Window> {
         let slack = SLACK * normal.abs().element_sum() * reach;
         corners.iter().all(|c| normal.dot(*c) < -slack)
     };
-    // By the planes through the eye and each side of the image.
+    // Planes through the eye and each side of the image.
     let [left, right, bottom, top] = rays.window;
     if outside(DVec3::new(1.0, 0.0, -left))
         || outside(DVec3::new(-1.0, 0.0, right))
@@ -132,7 +132,7 @@ fn window_of(rays: &Rays, opening: &Opening) -> Option<Window> {
     {
         return None;
     }
-    // Nothing is known of the directions to corners at depths about zero.
+    // A corner near depth zero has no reliable direction.
     if corners.iter().any(|c| c.z <= 4.0 * SLACK * reach) {
         return Some(rays.window);
     }
@@ -140,7 +140,7 @@ fn window_of(rays: &Rays, opening: &Opening) -> Option<Window> {
     let mut window = [most, least, most, least];
     for c in &corners {
         let (x, y) = (c.x / c.z, c.y / c.z);
-        // Both coordinates of x / z are off by below 2^-48 reach.
+        // Both coordinates of x / z are wrong by less than 2^-48 reach.
         let slack = 2.0 * SLACK * reach / c.z;
         let (sx, sy) = (slack * (1.0 + x.abs()), slack * (1.0 + y.abs()));
         window[0] = window[0].min(x - sx);

@@ -1,9 +1,10 @@
 //! Clusters: at most 64 neighbouring triangles of an item.
 //!
-//! Each triangle is a bit of a word. All of a cluster are of one kind and alike in sides.
+//! Each triangle is a bit of a word. All triangles of a cluster have the same kind and the same
+//! number of sides.
 //!
-//! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer
-//! grows meshlets). Deterministic.
+//! Grown greedily over common edges, along the Morton curve (as Kapoulkine's meshoptimizer grows
+//! meshlets). Deterministic.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -20,21 +21,23 @@ use crate::scene::Surfaces;
 /// Most triangles of a cluster: the bits of a word.
 pub const MOST_TRIANGLES: usize = 64;
 
-/// The triangles of surfaces in clusters. An item's clusters follow one another.
+/// Triangles of surfaces in clusters.
+///
+/// The clusters of an item are consecutive.
 #[derive(Clone, Debug)]
 pub struct Clusters {
-    /// The surfaces that were clustered.
+    /// Surfaces that were clustered.
     pub surfaces: Arc<Surfaces>,
     /// Indices of triangles, cluster after cluster.
     pub triangles: Vec<u32>,
     /// First index in `triangles` of each cluster; one more at the end.
     pub starts: Vec<u32>,
-    /// The clusters of each item.
+    /// Range of clusters of each item.
     pub of_item: Vec<Range<u32>>,
 }
 
 impl Clusters {
-    /// Clusters of at most `most` triangles, 1 to 64. O(t log t).
+    /// Builds clusters of at most `most` triangles, 1 to 64. O(t log t).
     ///
     /// # Panics
     /// If `most` is outside 1..=64.
@@ -56,42 +59,42 @@ impl Clusters {
         clusters
     }
 
-    /// How many clusters there are.
+    /// Number of clusters.
     #[allow(clippy::len_without_is_empty)] // No caller needs `is_empty`.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Indices of the triangles of a cluster: bit `i` of its word is the `i`-th.
+    /// Indices of a cluster's triangles: bit `i` of its word is the `i`-th.
     pub fn triangles_of(&self, cluster: usize) -> &[u32] {
         &self.triangles[self.starts[cluster] as usize..self.starts[cluster + 1] as usize]
     }
 
-    /// The corners of the triangles of a cluster, in the same order.
+    /// Corners of a cluster's triangles, in the same order.
     pub fn corners_of(&self, cluster: usize) -> impl Iterator<Item = [Vec3; 3]> {
         let triangles = self.triangles_of(cluster).iter();
         triangles.map(|&t| self.surfaces.corners(t))
     }
 
-    /// One bit for each triangle of a cluster.
+    /// Word of a cluster with a bit set for each of its triangles.
     pub fn word(&self, cluster: usize) -> u64 {
         u64::MAX >> (MOST_TRIANGLES - self.triangles_of(cluster).len())
     }
 
-    /// The one-sided clusters, with the corners of their triangles.
+    /// One-sided clusters, with the corners of their triangles.
     pub fn one_sided(&self) -> impl Iterator<Item = (usize, Vec<[Vec3; 3]>)> {
         let clusters = (0..self.len()).filter(|&cluster| !self.is_two_sided(cluster));
         clusters.map(|cluster| (cluster, self.corners_of(cluster).collect()))
     }
 
-    /// Returns `true` if the triangles of a cluster are seen from both sides.
+    /// Returns `true` if the triangles of a cluster are visible from both sides.
     pub fn is_two_sided(&self, cluster: usize) -> bool {
         self.surfaces.two_sided[self.triangles_of(cluster)[0] as usize]
     }
 
-    /// The triangles, of some of a cluster, that the eye sees the front of.
+    /// Triangles among those of `word` whose front faces the eye.
     ///
-    /// All of them where they have two sides. Exact; one predicate per triangle.
+    /// All of them if they are two-sided. Exact; one predicate per triangle.
     #[inline(never)]
     pub fn seen(&self, eye: &Eye, cluster: usize, word: u64) -> u64 {
         let corners = |bit: u32| {
@@ -104,13 +107,13 @@ impl Clusters {
     }
 }
 
-/// No neighbour across an edge.
+/// Index for no neighbour across an edge.
 const NONE: u32 = u32::MAX;
 
 /// A triangle of an item, to be added to a cluster.
 struct Node {
     centre: DVec3,
-    /// Unit length, or zero.
+    /// Unit normal, or zero.
     normal: DVec3,
     neighbours: [u32; 3],
     is_used: bool,
@@ -144,14 +147,15 @@ fn grow(surfaces: &Surfaces, run: Range<u32>, most: usize, out: &mut Clusters) {
                 let node = &nodes[index as usize];
                 let free = |&&n: &&u32| n != NONE && !nodes[n as usize].is_used;
                 let free = node.neighbours.iter().filter(free).count();
-                // Near, turned alike, and rather those that would be left alone.
+                // Prefers triangles that are near and have a similar normal and few free
+                // neighbours.
                 let turned = 1.5 - node.normal.dot(axis);
                 node.centre.distance_squared(centre) * turned * (2.0 + free as f64)
             };
             let costs = frontier.iter().map(|&index| (cost(index), index));
             let best = costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             next = best.map(|(_, index)| index).or_else(|| {
-                // The piece is used up: on to the next along the curve.
+                // The component is used up: continue along the curve.
                 seeds.find(|&seed| !nodes[seed as usize].is_used)
             });
         }
@@ -178,7 +182,7 @@ fn nodes(surfaces: &Surfaces, run: Range<u32>) -> Vec<Node> {
         }
     }
     edges.sort_unstable();
-    // More than two that meet are chained in pairs.
+    // An edge with more than two triangles links them in pairs.
     for run in edges.chunk_by(|a, b| a.0 == b.0) {
         for pair in run.chunks_exact(2) {
             let (a, b) = (pair[0].1 as usize, pair[1].1 as usize);
@@ -189,7 +193,7 @@ fn nodes(surfaces: &Surfaces, run: Range<u32>) -> Vec<Node> {
     nodes
 }
 
-/// The triangles by the Morton code of their centres, 21 bits an axis.
+/// Triangles in the order of their centres' Morton codes, 21 bits per axis.
 fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
     let low = bounds.min.as_dvec3();
     let edge = (bounds.max.as_dvec3() - low).max_element();

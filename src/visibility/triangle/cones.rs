@@ -1,26 +1,26 @@
-//! A cone per cluster in f32 with a proven margin, sixteen clusters at a time.
+//! Normal cones in f32 with a proven margin, one per cluster, sixteen at a time.
 //!
 //! Let all normals be within the angle alpha of the axis A, and the apex P not in
 //! front of any triangle. For an eye e with v = P - e and v.A >= sin(alpha) |A| |v|,
 //! the angle of v and A is at most 90° - alpha, so n.v >= 0 for every normal n, and
-//! n.(e - a) = n.(P - a) - n.v <= 0: no triangle turns its front to e. (The test is
-//! meshoptimizer's, there without a term for rounding.)
+//! n.(e - a) = n.(P - a) - n.v <= 0: no triangle faces e. (The test is
+//! meshoptimizer's, which has no term for rounding.)
 //!
 //! Rounding, u = 2^-24. The eye is rounded to f32 with an error E, known per view;
 //! v' = P - e' rounds once more: |v - v'| <= E + u |v'|. Let s' be the computed
-//! v'.A and q' the computed |v'|², both off by at most 3.01 u (|v'| |A|, |v'|²). The
-//! test is, with rounding in each step,
+//! v'.A and q' the computed |v'|², wrong by at most 3.01 u |v'| |A| and 3.01 u |v'|².
+//! The test, with rounding in each step, is
 //!
 //! ```text
 //! t = s' - M >= 0   and   t² >= k² q'
 //! ```
 //!
-//! from which, for |A| <= 1 + 2^-20, v'.A >= M + |v'| (k (1 - 3.7 u) - 3.01 u |A|).
-//! Wanted is v.A >= sin(alpha) |A| |v|, for which it is enough that v'.A >=
-//! sin(alpha) |A| |v'| + 2 |A| (E + u |v'|). So M >= 2 |A| E and
-//! k >= sin(alpha) |A| + 9 u prove it: 10 u is taken. M is at least 2^-40, so that
-//! |v'| > 2^-41 wherever the test holds and neither k² q' nor t² underflows; below
-//! 2^59 nothing overflows.
+//! For |A| <= 1 + 2^-20 it implies v'.A >= M + |v'| (k (1 - 3.7 u) - 3.01 u |A|).
+//! The proof needs v.A >= sin(alpha) |A| |v|, for which v'.A >=
+//! sin(alpha) |A| |v'| + 2 |A| (E + u |v'|) is enough. So M >= 2 |A| E and
+//! k >= sin(alpha) |A| + 9 u suffice; the code takes 10 u. M is at least 2^-40, so
+//! that |v'| > 2^-41 wherever the test holds and neither k² q' nor t² underflows;
+//! below 2^59 nothing overflows.
 
 use std::sync::Arc;
 
@@ -33,33 +33,34 @@ use crate::arithmetic::rounding::round_up;
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 
-/// Slack of the sine for the rounding of the test: see above.
+/// Slack of the sine for the rounding of the test: derived above.
 const SLACK: f64 = 10.0 / (1u64 << 24) as f64;
-/// Error of a cosine of two normals in f64, with the error of the normals (2^-50
-/// each): some units of 2^-50.
+/// Bound of the error of a cosine of two normals in f64.
+///
+/// Some units of 2^-50, including the error of the normals (2^-50 each).
 const COSINE: f64 = 64.0 / (1u64 << 53) as f64;
 /// Coordinate above which products of three numbers may overflow.
 pub const FAR: f32 = (1u64 << 59) as f32;
 /// Least margin in world units.
 const LEAST_MARGIN: f64 = 1.0 / (1u64 << 40) as f64;
-/// Steps in which the axis is found.
+/// Iterations of the axis search.
 const STEPS: u32 = 48;
 
 /// Apex, axis and sine of a cone, with the slack of [`Cone::fit`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cone {
-    /// Not in front of any triangle.
+    /// Point in front of no triangle.
     pub apex: Vec3,
-    /// Not longer than 1 + 2^-20.
+    /// Axis of length at most 1 + 2^-20.
     pub axis: Vec3,
-    /// k: at least sin(alpha) |axis| and the slack.
+    /// k: at least sin(alpha) |axis| plus the slack.
     pub sine: f64,
 }
 
 impl Cone {
-    /// The cone of some triangles; `None` if every eye may see one of them.
+    /// Fits a cone to triangles; `None` if every eye may see one of them.
     pub fn fit(triangles: &[[Vec3; 3]]) -> Option<Cone> {
-        // A triangle without area is never seen.
+        // A triangle without area is never visible.
         let planes = triangles.iter().map(|corners| (*corners, normal(*corners)));
         let with_area = planes.filter(|(_, n)| *n != DVec3::ZERO);
         let planes = with_area.map(|(corners, n)| (corners, n.normalize()));
@@ -86,8 +87,10 @@ impl Cone {
     }
 }
 
-/// The direction whose largest angle to the normals is least, nearly: the centre of
-/// their smallest ball (Bădoiu and Clarkson 2003, "Smaller core-sets for balls").
+/// Direction that approximately minimizes the largest angle to the normals.
+///
+/// Approximates the centre of their smallest enclosing ball (Bădoiu and Clarkson 2003, "Smaller
+/// core-sets for balls").
 fn axis_of(normals: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
     let mut centre = normals.clone().sum::<DVec3>() / normals.clone().count() as f64;
     for step in 0..STEPS {
@@ -95,14 +98,14 @@ fn axis_of(normals: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
             let distance = |n: &DVec3| n.distance_squared(centre);
             distance(a).total_cmp(&distance(b))
         };
-        // None without normals.
+        // `None` without normals.
         let farthest = normals.clone().max_by(far)?;
         centre += (farthest - centre) / f64::from(step + 2);
     }
     centre.try_normalize()
 }
 
-/// A point of f32 that is in front of no triangle: proven by the exact test.
+/// A point in f32 that is in front of no triangle, proven by the exact test.
 fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
     let bounds = Aabb::of_points(planes.iter().flat_map(|(corners, _)| *corners));
     let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
@@ -125,7 +128,7 @@ fn apex_of(planes: &[([Vec3; 3], DVec3)], axis: DVec3) -> Option<Vec3> {
     None
 }
 
-/// A cone per cluster.
+/// Back end with one cone per cluster.
 #[derive(Clone, Debug)]
 pub struct Cones(Vec<ConeBlock>);
 
@@ -144,7 +147,7 @@ impl Cones {
 
 impl TriangleCull for Cones {
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
-        // From farther away the test could overflow.
+        // Farther away the test could overflow.
         if eye.nearest.abs().max_element() < FAR {
             kernel.run(Query(&self.0, eye, &mut kept.blocks));
         }
@@ -166,7 +169,7 @@ impl Work for Query<'_> {
     }
 }
 
-/// Sixteen cones in f32: 28 bytes a cone.
+/// Sixteen cones in f32: 28 bytes per cone.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct ConeBlock {
@@ -177,14 +180,14 @@ struct ConeBlock {
 }
 
 impl ConeBlock {
-    /// Sixteen cones that reject nothing.
+    /// Block of cones that reject nothing.
     const EMPTY: ConeBlock = ConeBlock {
         apex: [[0.0; LANES]; 3],
         axis: [[0.0; LANES]; 3],
         square: [f32::INFINITY; LANES],
     };
 
-    /// Writes a cone.
+    /// Stores a cone in a lane.
     fn set(&mut self, lane: usize, cone: &Cone) {
         for k in 0..3 {
             self.apex[k][lane] = cone.apex[k];
@@ -194,10 +197,10 @@ impl ConeBlock {
     }
 }
 
-/// The lanes that see none of their triangles. At the lowest: 21 operations.
+/// Lanes from which no triangle is visible: 21 operations at least.
 #[inline(always)]
 fn rejected<I: Isa>(isa: I, block: &ConeBlock, view: &Broadcast<I>) -> LaneMask {
-    // One by one: a closure would be compiled for the portable set.
+    // Written out, as a closure would be compiled for the portable instruction set.
     let [x, y, z] = [&block.apex[0], &block.apex[1], &block.apex[2]];
     let [x, y, z] = [isa.load(x), isa.load(y), isa.load(z)];
     let [a, b, c] = [&block.axis[0], &block.axis[1], &block.axis[2]];
@@ -220,12 +223,12 @@ pub fn dot<I: Isa>(isa: I, [x, y, z]: [I::Floats; 3], [a, b, c]: [I::Floats; 3])
     isa.add(xy, isa.mul(z, c))
 }
 
-/// An eye in all lanes.
+/// Eye broadcast to all lanes.
 #[derive(Clone, Copy)]
 struct Broadcast<I: Isa> {
-    /// A difference is then a sum.
+    /// Negated eye, so that a difference is a sum.
     minus_eye: [I::Floats; 3],
-    /// -M.
+    /// -M, see above.
     minus_margin: I::Floats,
     zero: I::Floats,
     /// `true` if the eye is at infinity: the apex does not matter.
@@ -246,7 +249,7 @@ impl<I: Isa> Broadcast<I> {
     }
 }
 
-/// Four words per number below 16: all ones where its bit is set.
+/// Four words for each number below 16: all ones where its bit is set.
 const SPREAD: [[u64; 4]; 16] = {
     let mut spread = [[0; 4]; 16];
     let mut bits = 0;
@@ -263,7 +266,7 @@ const SPREAD: [[u64; 4]; 16] = {
     spread
 };
 
-/// Clears the words of the lanes that are gone, without branches.
+/// Clears the words of the lanes in `gone`, without branches.
 ///
 /// Four lanes at a time, by a table: compilers turn a comparison here into masked stores.
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! The side of a triangle that an eye is on, exactly: the truth of this stage.
+//! Exact side of a triangle that an eye is on: the truth of this stage.
 
 use glam::{DVec3, Vec3};
 
@@ -7,37 +7,35 @@ use crate::arithmetic::{Expansion, cross, cross_sizes, two_sum};
 use crate::camera::Camera;
 use crate::kernel::each;
 
-/// An eye in scene-local coordinates, as an exact sum of two f64 per axis, beside
-/// the nearest f32 point.
+/// Eye in homogeneous scene-local coordinates, an exact sum of two f64 per axis.
 ///
-/// Homogeneous: for an eye at infinity `weight` is 0 and the rest is the direction
-/// towards it. A triangle `a`, `b`, `c` turns its front to the eye `e` where
-/// `((b - a) x (c - a)) . (e - weight a) > 0`.
+/// For an eye at infinity `weight` is 0 and the rest is the direction towards it. A triangle `a`,
+/// `b`, `c` faces the eye `e` if `((b - a) x (c - a)) . (e - weight a) > 0`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Eye {
-    /// The larger part.
+    /// The larger part of the sum.
     pub high: DVec3,
-    /// The rest, which rounding took from it: at most half an ulp of `high`.
+    /// Rounding remainder: at most half an ulp of `high`.
     pub low: DVec3,
     /// 1 for a point, 0 for a direction.
     pub weight: f32,
-    /// The f32 point next to it.
+    /// Nearest f32 point.
     pub nearest: Vec3,
-    /// At least the distance from the eye to `nearest`.
+    /// Upper bound of the distance from the eye to `nearest`.
     pub error: f64,
 }
 
 impl Eye {
-    /// The eye of a camera on surfaces about an origin.
+    /// Eye of a camera, relative to the origin of surfaces.
     pub fn of(camera: &Camera, origin: DVec3) -> Eye {
         if !camera.lens.is_orthographic() {
             return Eye::at(camera.frame.eye, origin);
         }
-        // The direction of the rays, rounded once.
+        // Direction of the rays, rounded once.
         Eye::along(camera.frame.forward())
     }
 
-    /// A point of the world as seen from a scene's origin. Exact.
+    /// A world point relative to a scene's origin. Exact.
     pub fn at(world: DVec3, origin: DVec3) -> Eye {
         let [x, y, z] = [0, 1, 2].map(|k| two_sum(world[k], -origin[k]));
         let high = DVec3::new(x.0, y.0, z.0);
@@ -68,19 +66,19 @@ impl Eye {
     }
 }
 
-/// Error of the filter per unit of the permanent. Three differences of one rounding
-/// each, two products, a difference, a product and two sums: eight roundings on the
-/// longest way, 8 * 2^-53 and terms of second order (Shewchuk 1997 proves 7 for this
-/// order of operations); 16 is twice that.
+/// Error of the filter, relative to the permanent.
+///
+/// Three differences of one rounding each, two products, a difference, a product and two sums:
+/// eight roundings on the longest path, 8 * 2^-53 and terms of second order (Shewchuk 1997 proves 7
+/// for this order of operations); 16 is twice that.
 const FILTER: f64 = 16.0 / (1u64 << 53) as f64;
 
 /// Returns `true` if the eye is strictly in front of a triangle.
 ///
-/// Its corners turn counter-clockwise seen from there. A one-sided triangle is not seen from
-/// behind or from its plane, and one without area from nowhere.
+/// Its corners then turn counter-clockwise as seen by the eye. A one-sided triangle is not visible
+/// from behind or from its plane, and one without area from nowhere.
 ///
-/// Exact for finite corners and an eye whose coordinates are zero or between
-/// 2^-500 and 2^500.
+/// Exact for finite corners and an eye whose coordinates are zero or between 2^-500 and 2^500.
 pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
     let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
     let (u, v) = (b - a, c - a);
@@ -88,12 +86,12 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
     let determinant = w.dot(u.cross(v));
     let minors = cross_sizes(u.abs(), v.abs());
     let (size, low) = (w.abs().dot(minors), eye.low.abs().dot(minors));
-    // Every product is zero: in the plane of a view along an axis.
+    // Every product is zero: the triangle's plane contains the direction of a view along an axis.
     if size + low == 0.0 {
         return false;
     }
-    // Adds the share of the low part of the eye, doubled for the roundings here, and what
-    // underflow may take.
+    // Adds the contribution of the eye's low part, doubled for the roundings here, and a bound of
+    // the underflow.
     let bound = FILTER * size + 2.0 * low + 1e-300;
     if determinant.abs() > bound {
         return determinant > 0.0;
@@ -101,7 +99,7 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
     orientation(eye, corners) > 0
 }
 
-/// The sign of the determinant by expansions.
+/// Sign of the determinant by expansions.
 #[cold]
 fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
     let a = corners[0] * eye.weight;
@@ -109,19 +107,20 @@ fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
     exact::dot(&way, &exact_normal(corners)).sign()
 }
 
-/// A normal of a triangle, each component true to 2^-50 of itself; zero exactly
-/// where the triangle has no area. Not of unit length.
+/// Normal of a triangle, each component accurate to 2^-50 of itself.
+///
+/// Zero exactly if the triangle has no area. Not of unit length.
 pub fn normal(corners: [Vec3; 3]) -> DVec3 {
     let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
     let is_exact = |p: DVec3, q: DVec3| (0..3).all(|k| two_sum(p[k], -q[k]).1 == 0.0);
     if is_exact(b, a) && is_exact(c, a) {
-        // Kahan's products do not cancel: two roundings at the most.
+        // Kahan's products do not cancel: two roundings at most.
         return cross(b - a, c - a);
     }
     exact::estimate(&exact_normal(corners))
 }
 
-/// The cross product of two edges, exactly.
+/// Exact cross product of two edges.
 pub fn exact_normal(corners: [Vec3; 3]) -> ExactVector {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     exact::cross(&exact::difference(b, a), &exact::difference(c, a))
@@ -134,7 +133,7 @@ mod tests {
     use super::*;
     use crate::scene::SeededRng;
 
-    /// A number as a whole count of 2^-300.
+    /// A number as an integer count of 2^-300.
     fn units(x: f64) -> IBig {
         let bits = x.abs().to_bits();
         let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
@@ -173,7 +172,7 @@ mod tests {
                 corners[2] = corners[0] + (corners[1] - corners[0]) * 0.3;
             }
             let [a, b, c] = corners.map(Vec3::as_dvec3);
-            // In the plane but for rounding, or an ulp or two from it.
+            // In the plane except for rounding, or an ulp or two away from it.
             let (s, t) = (rng.between(-9.0, 9.0), rng.between(-9.0, 9.0));
             let mut at = a + (b - a) * s + (c - a) * t;
             at[round % 3] += at[round % 3].abs() * f64::EPSILON * (rng.below(5) as f64 - 2.0);
@@ -207,7 +206,7 @@ mod tests {
         // An ulp of 2 is 2^-22.
         let ulp = 2f64.powi(-22);
         assert_eq!(normal(thin), DVec3::new(ulp, -ulp, 0.0));
-        // Edges that f64 cannot hold.
+        // Edges that f64 cannot represent.
         let (tiny, far) = (2f32.powi(-100), 2f32.powi(20));
         let wide = [Vec3::X * tiny, Vec3::X * far, Vec3::new(far, tiny, 0.0)];
         assert!(normal(wide).z > 0.0);

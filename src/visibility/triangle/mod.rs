@@ -1,4 +1,4 @@
-//! The triangle stage: the triangles of the remaining items that can be seen.
+//! Triangle stage: the triangles of the remaining items that may be visible.
 //!
 //! One file per back end, all of them in one table.
 
@@ -29,21 +29,21 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = rows! { TriangleRow { name, guarantee,
 #[cfg(test)]
 mod tests;
 
-/// Some of the triangles of clusters.
+/// Set of triangles of clusters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Selection {
-    /// Those beyond the last cluster are zero.
+    /// Words in blocks; those beyond the last cluster are zero.
     blocks: Vec<[u64; LANES]>,
     clusters: usize,
 }
 
 impl Selection {
-    /// All triangles.
+    /// Set of all triangles.
     pub fn all(clusters: &Clusters) -> Selection {
         Selection::of_items(clusters, 0..clusters.of_item.len() as u32)
     }
 
-    /// All triangles of these items: what the object stage left.
+    /// All triangles of these items, which the object stage left.
     pub fn of_items(clusters: &Clusters, items: impl IntoIterator<Item = u32>) -> Selection {
         let mut selection = Selection {
             blocks: vec![[0; LANES]; clusters.len().div_ceil(LANES)],
@@ -63,39 +63,40 @@ impl Selection {
         &self.blocks.as_flattened()[..self.clusters]
     }
 
-    /// The words, to remove triangles.
+    /// Mutable words, to remove triangles.
     ///
-    /// Bits beyond the triangles of a cluster stay zero.
+    /// Bits beyond the triangles of a cluster must stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.blocks.as_flattened_mut()[..self.clusters]
     }
 
-    /// How many triangles there are.
+    /// Number of triangles in the set.
     pub fn triangles(&self) -> usize {
         let counts = self.words().iter().map(|word| word.count_ones() as usize);
         counts.sum()
     }
 
-    /// How many of these triangles are not in another selection.
+    /// Number of triangles that are not in another set.
     pub fn without(&self, other: &Selection) -> usize {
         let pairs = self.words().iter().zip(other.words());
         pairs.map(|(a, b)| (a & !b).count_ones() as usize).sum()
     }
 }
 
-/// A back end, built for certain clusters.
+/// Back end, built for certain clusters.
 pub trait TriangleCull: Send + Sync {
-    /// Removes triangles that cannot be seen from `kept`; adds none.
+    /// Removes triangles that cannot be visible from `kept`; adds none.
     ///
-    /// The answer is the same with every kernel.
+    /// The answer does not depend on the kernel.
     fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection);
 }
 
-/// A row of the table of back ends.
+/// Row of the table of back ends.
 pub type TriangleRow = Row<fn(&Arc<Clusters>) -> Box<dyn TriangleCull>>;
 
-/// The truth of this stage: triangles of `candidates` whose front the eye sees,
-/// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
+/// Truth of this stage: triangles of `candidates` that face the eye.
+///
+/// Includes all two-sided triangles. Exact; one predicate per triangle, without a shared structure.
 pub fn facing(clusters: &Clusters, eye: &Eye, candidates: &Selection) -> Selection {
     let mut truth = candidates.clone();
     for (cluster, word) in truth.words_mut().iter_mut().enumerate() {

@@ -1,13 +1,14 @@
-//! Every triangle for itself, exactly.
+//! Exact back-face test of each triangle.
 //!
-//! Sixteen planes at a time in f32 with a bound on the error, and the exact test where that
-//! does not decide.
+//! Sixteen planes at a time in f32 with an error bound, and the exact test where that does not
+//! decide.
 //!
-//! Normals are scaled so that their largest component is about 1. Let u = 2^-24, E
-//! the error of the f32 eye. The way from corner to eye is off by E and u of itself,
-//! a normal's component by u, three products and two sums by 3.01 u: together the
-//! side is off by at most 1.75 E + 5.1 u |way|, where |way| adds components and 1.75
-//! is above the root of three. The bound takes 8 u, for its own rounding (5 u of it).
+//! Normals are scaled so that their largest component is about 1. Let u = 2^-24 and E the error of
+//! the f32 eye. The vector from corner to eye is wrong by E and u of itself, a normal's component
+//! by u, three products and two sums by 3.01 u. Together the signed distance is wrong by at most
+//! 1.75 E + 5.1 u |way|, where |way| is the sum of the vector's absolute components and 1.75
+//! exceeds the square root of three. The code takes 8 u, to cover the rounding of the bound itself
+//! (5 u of it).
 
 use std::sync::Arc;
 
@@ -20,14 +21,14 @@ use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
-/// Error per unit of the way: see above.
+/// Error relative to |way|: derived above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
-/// For what underflows.
+/// Least error bound, for underflow.
 const LEAST: f64 = 1e-30;
 
-/// Sixteen triangles: normals, scaled, and first corners.
+/// Sixteen triangles: scaled normals and first corners.
 ///
-/// Without area, or without a triangle, the normal of a lane is NaN: never in front.
+/// If a lane has no triangle, or one without area, its normal is NaN: never in front.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Planes {
@@ -44,7 +45,9 @@ impl Planes {
 
 pub struct PerTriangle {
     clusters: Arc<Clusters>,
-    /// First planes of each cluster; one more at the end. A two-sided cluster has none.
+    /// First plane block of each cluster, then the end.
+    ///
+    /// A two-sided cluster has no planes.
     starts: Vec<u32>,
     planes: Vec<Planes>,
     /// `true` if all corners are near enough for f32.
@@ -52,7 +55,7 @@ pub struct PerTriangle {
 }
 
 impl PerTriangle {
-    /// O(t).
+    /// Prepares the planes. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> PerTriangle {
         let (mut starts, mut planes) = (vec![0], Vec::new());
         for cluster in 0..clusters.len() {
@@ -125,7 +128,7 @@ impl Work for Query<'_> {
     }
 }
 
-/// The eye in all lanes.
+/// Eye broadcast to all lanes.
 struct Lanes<I: Isa> {
     at: [I::Floats; 3],
     /// -1 for a point, 0 for a direction.
@@ -149,7 +152,7 @@ impl<I: Isa> Lanes<I> {
     }
 }
 
-/// The lanes surely in front, and those in doubt.
+/// Lanes that certainly face the eye, and undecided lanes.
 #[inline(always)]
 fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
     let x = way(isa, &planes.corner[0], eye.at[0], eye);
@@ -158,7 +161,7 @@ fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
     let [a, b, c] = [&planes.normal[0], &planes.normal[1], &planes.normal[2]];
     let [a, b, c] = [isa.load(a), isa.load(b), isa.load(c)];
     let side = dot(isa, [a, b, c], [x, y, z]);
-    // The negated lengths, as there is only a minimum.
+    // Negated absolute values, as there is only a minimum.
     let [x, y, z] = [least(isa, x, eye), least(isa, y, eye), least(isa, z, eye)];
     let length = isa.add(isa.add(x, y), z);
     let bound = isa.add(isa.mul(length, eye.minus_error), eye.margin);
@@ -172,7 +175,7 @@ fn way<I: Isa>(isa: I, corner: &[f32; LANES], at: I::Floats, eye: &Lanes<I>) -> 
     isa.add(at, isa.mul(isa.load(corner), eye.minus_weight))
 }
 
-/// -|x|
+/// Computes -|x|.
 #[inline(always)]
 fn least<I: Isa>(isa: I, x: I::Floats, eye: &Lanes<I>) -> I::Floats {
     isa.min(x, isa.mul(x, eye.minus_one))

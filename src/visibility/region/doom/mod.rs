@@ -1,16 +1,15 @@
 //! Doom maps: sectors as regions, two-sided linedefs as openings.
 //!
-//! One-sided linedefs are solid, and so are those between sectors whose heights leave no
-//! opening. Sectors that a linedef's action moves count as open, at any height. Floors and
-//! ceilings hide for the eye.
+//! One-sided linedefs are solid, and so are those between sectors whose heights leave no opening.
+//! Sectors that a linedef's action moves count as open at any height. For the eye, floors and
+//! ceilings are opaque.
 //!
-//! This is the world of the game. If items are treated as solid boxes, rays pass over and
-//! under them, as floors and ceilings are not items; there is no guarantee for items that
-//! such a ray meets beyond a ceiling.
+//! This is the world of the game. If items are treated as solid boxes, rays pass over and under
+//! them, as floors and ceilings are not items; there is no guarantee for items that such a ray
+//! meets beyond a ceiling.
 //!
-//! The same map as triangles, floors and ceilings among them, is
-//! [`DoomMap::surfaces`]; what these enclose from outside, in boxes, is
-//! [`DoomMap::solid_boxes`].
+//! [`DoomMap::surfaces`] is the same map as triangles, with floors and ceilings;
+//! [`DoomMap::solid_boxes`] are boxes in the solid space that these enclose.
 
 mod solid;
 mod surfaces;
@@ -27,20 +26,21 @@ use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
 
 pub use surfaces::surfaces_of;
 
-/// Height at which sectors that move end; map units fit 16 bits.
+/// Height bound of sectors that move; map units fit 16 bits.
 const HIGHEST: f64 = 32768.0;
 
-/// A Doom map with its moving sectors open.
+/// Doom map with its moving sectors open.
 #[derive(Clone, Debug)]
 pub struct DoomMap {
-    /// The map as decoded.
+    /// Map as decoded.
     file: Arc<WadMap>,
-    /// Linedefs, in file order, those of length zero left out.
+    /// Linedefs in file order, without those of length zero.
     pub lines: Vec<Linedef>,
-    /// Heights of floor and ceiling of each sector, in file order; beyond all others
-    /// where the sector moves.
+    /// Heights of floor and ceiling of each sector, in file order.
+    ///
+    /// If the sector moves, they lie beyond all other heights.
     pub sectors: Vec<[f64; 2]>,
-    /// The linedefs about each sector, which lies on the right of each.
+    /// Linedefs around each sector, directed so that the sector is on their right.
     edges: Vec<Vec<[[i32; 2]; 2]>>,
 }
 
@@ -63,11 +63,11 @@ fn is_still(action: u16) -> bool {
     )
 }
 
-/// Tags of sectors that the death of a boss moves.
+/// Tags of sectors that move when a boss dies.
 const BOSS_TAGS: [u16; 2] = [666, 667];
 
 impl DoomMap {
-    /// The map that a scene was loaded from, if it was one.
+    /// Map that a scene was loaded from, if it was loaded from one.
     pub fn of_scene(scene: &Scene) -> Option<Arc<DoomMap>> {
         match &scene.regions {
             Regions::Bsp(map) => Some(Arc::new(DoomMap::of(map.clone()))),
@@ -75,7 +75,7 @@ impl DoomMap {
         }
     }
 
-    /// Finds the sectors that move, and the linedefs about each. O(linedefs + sectors).
+    /// Finds the sectors that move and the linedefs of each. O(linedefs + sectors).
     pub fn of(file: Arc<WadMap>) -> DoomMap {
         let acts = |line: &&Linedef| line.tag != 0 && !is_still(line.action);
         let tags = file.lines.iter().filter(acts).map(|line| line.tag);
@@ -110,7 +110,7 @@ impl DoomMap {
         }
     }
 
-    /// Lowest and highest height that a linedef lets through; `None` where it is solid.
+    /// Lowest and highest height that a linedef leaves open; `None` if it is solid.
     pub fn opening(&self, line: &Linedef) -> Option<[f64; 2]> {
         let sides = [line.sectors[0]?, line.sectors[1]?];
         let [a, b] = sides.map(|sector| self.sectors[sector as usize]);
@@ -118,17 +118,19 @@ impl DoomMap {
         (low < high).then_some([low, high])
     }
 
-    /// The map's REJECT table: its claim of which sectors see each other. A table that
-    /// is too short counts as none, as in engines.
+    /// The map's REJECT table: pairs of sectors that see each other.
+    ///
+    /// `None` if the table is too short, as in engines. The table is a claim, not a proof.
     pub fn reject(&self) -> Option<Pvs> {
         Pvs::from_reject(&self.file.reject, self.sectors.len())
     }
 
-    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
-    /// all heights.
+    /// Graph with sectors as regions and open linedefs as openings.
+    ///
+    /// A sector's parts have unlimited height.
     ///
     /// # Errors
-    /// A place about which the linedefs disagree: what is open to what is not known then.
+    /// A place about which linedefs disagree: its openings are unknown.
     pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
         if let Some(dispute) = self.file.disputes().first() {
             return Err(*dispute);
@@ -146,7 +148,7 @@ impl DoomMap {
             })
         };
         let openings = self.lines.iter().filter_map(opening).collect();
-        // Boxes about the leaves of the map's own tree, without a height.
+        // Boxes of the leaves of the map's own tree, of unlimited height.
         let all_heights = DVec3::Z * (2.0 * HIGHEST);
         let mut parts = vec![Vec::new(); self.sectors.len()];
         for (&sector, b) in self.file.leaf_sectors.iter().zip(&self.file.tree.boxes) {
@@ -158,11 +160,11 @@ impl DoomMap {
     }
 }
 
-/// The ground of a map.
+/// Region locator of a map.
 #[derive(Debug)]
 struct SectorGround {
     map: Arc<DoomMap>,
-    /// Boxes about its linedefs, at height zero.
+    /// Boxes of its linedefs, at height zero.
     lines: BoxGrid,
 }
 
@@ -178,10 +180,12 @@ impl SectorGround {
         SectorGround { map, lines }
     }
 
-    /// The sector of a point: what the first linedef towards larger x has on this
-    /// side, seen a little above the point, of several in one place the first in file order.
+    /// Sector at a point: the near side of the first linedef towards larger x.
+    ///
+    /// The ray runs slightly above the point; among coincident linedefs the first in file order
+    /// counts.
     fn sector_at(&self, mut p: DVec2) -> Option<RegionId> {
-        // Vertices have integer heights: none is missed by the rounding of one.
+        // Vertices have integer y: y is snapped, so that rounding misses none.
         if (p.y - p.y.round()).abs() < 1e-9 {
             p.y = p.y.round();
         }
@@ -193,9 +197,9 @@ impl SectorGround {
             let slope = (b.x - a.x) / (b.y - a.y);
             let x = a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
             let is_crossed = (a.y <= p.y) != (b.y <= p.y);
-            // Where lines begin at one vertex, the least slope is the first above it.
+            // At a common vertex, the line of least slope is the first above it.
             if is_crossed && x >= p.x && (x, slope, id) < nearest {
-                // Left of a line that goes up is the side of smaller x.
+                // The left of a line that goes up is the side of smaller x.
                 (nearest, found) = ((x, slope, id), line.sectors[usize::from(b.y > a.y)]);
             }
         });
@@ -203,7 +207,9 @@ impl SectorGround {
     }
 }
 
-/// Tests whether a linedef, whose box does, may meet a closed box, from above.
+/// Tests in plan view whether a linedef may meet a closed box.
+///
+/// Their bounding boxes are known to meet.
 fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let [from, to] = line.ends.map(plan);
     let (low, high) = (b.min.truncate(), b.max.truncate());
@@ -211,12 +217,12 @@ fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
     let sides = [low.x, high.x].map(|x| [low.y, high.y].map(|y| side(x, y)));
     let sides = sides.as_flattened();
-    // Rounding of the side is below this: |d| and distances are below 2^18.
+    // Bound of the rounding of a side: |d| and distances are below 2^18.
     let slack = 1e-4;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
 }
 
-/// Leaves of the map's tree differ from its sectors by what a node builder rounds.
+/// Leaves of the map's tree differ from its sectors by a node builder's rounding.
 impl Ground for SectorGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let mut inside = true;
@@ -232,7 +238,7 @@ impl Ground for SectorGround {
         let sector = self.sector_at((b.min + b.max).truncate() * 0.5);
         inside &= sector.is_some();
         out.extend(sector);
-        // Below a floor or above a ceiling is nowhere.
+        // Below a floor or above a ceiling there is no region.
         inside
             && out[first..].iter().all(|&sector| {
                 let [floor, ceiling] = self.map.sectors[sector as usize];
@@ -247,7 +253,7 @@ mod tests {
     use crate::scene::load;
     use std::collections::BTreeSet;
 
-    /// Rooms have their corners, and eyes stand, at integer heights.
+    /// Rooms have their corners, and eyes stand, at integer y.
     #[test]
     fn the_sector_at_the_height_of_a_vertex_is_that_of_a_point_beside_it() {
         for (name, least) in [("freedm-map12", 2000), ("freedm-map20", 10_000)] {

@@ -1,13 +1,12 @@
-//! Boxes in the solid of a map.
+//! Occluder boxes in the solid space of a map.
 //!
-//! Pieces of what its walls, floors and ceilings enclose from outside, simple enough to be drawn
-//! as occluders.
+//! They fill parts of the space enclosed by its walls, floors and ceilings, and are simple enough
+//! to draw.
 //!
-//! Open is what lies above some sector between its floor and its ceiling; everything
-//! else is solid. Where all sectors close, no ray leaves the open without meeting a
-//! surface that hides ([`DoomMap::surfaces`]), so whatever is behind a box of the
-//! solid is hidden for an eye in the open. Corners are whole numbers and all tests of
-//! the plan exact.
+//! A point is open if it lies above some sector, between its floor and its ceiling; everything else
+//! is solid. If all sectors are closed, no ray leaves the open space without meeting a surface that
+//! hides ([`DoomMap::surfaces`]), so a box in the solid space hides what is behind it for an eye in
+//! the open. Corners are integers and all tests of the plan are exact.
 
 use glam::DVec3;
 
@@ -18,25 +17,26 @@ use crate::scene::WorldBox;
 
 /// Most columns, and most rows, of the plan.
 const MOST_CELLS: usize = 512;
-/// Boxes whose longer side is less hide little, map units.
+/// Least length of a box's longer side, map units: smaller boxes hide little.
 const LEAST_SIDE: f64 = 32.0;
-/// A box is taken if this part of its plan is its own: of its height and in no box
-/// before it.
+/// Least share of a box's plan area that is new.
+///
+/// A cell is new if the box's height is its own and no earlier box covers the cell.
 const LEAST_NEW: f64 = 0.5;
-/// Most boxes of one height.
+/// Most boxes per height.
 const MOST_OF_HEIGHT: usize = 128;
-/// Most boxes.
+/// Most boxes per map.
 const MOST_BOXES: usize = 2048;
 
 impl DoomMap {
-    /// Boxes whose open inside holds no point of any sector between its floor and its
-    /// ceiling, from `low` to `high` at most: rock between rooms, below floors and above
-    /// ceilings, first those that fill the whole height. None if some sector is
+    /// Boxes whose open interior is disjoint from the open space of all sectors.
+    ///
+    /// They extend at most from `low` to `high`: rock between rooms, below floors and above
+    /// ceilings; those that fill the whole height come first. None if some sector is
     /// [unclosed](DoomMap::unclosed), as rays leave the map there.
     ///
-    /// A search for large rectangles of the plan, whose lines are those of the map's
-    /// corners; they may overlap, which leaves no seams between them.
-    /// O(heights * boxes of each * cells).
+    /// Searches large rectangles of the plan, whose grid lines are those of the map's corners.
+    /// Boxes may overlap, so there are no seams between them. O(heights * boxes of each * cells).
     pub fn solid_boxes(&self, [low, high]: [f64; 2]) -> Vec<WorldBox> {
         let Some(plan) = Plan::of(self) else {
             return Vec::new();
@@ -46,7 +46,7 @@ impl DoomMap {
         for cells in &plan.rectangles(&rock, |_| true) {
             found.push(plan.box_of(cells, low, high));
         }
-        // A floor hides as far as it is flat or higher, a ceiling as it is lower.
+        // Below a height, cells with a floor at or above it are solid; likewise above ceilings.
         let sides = [(0, 1.0, low), (1, -1.0, high)];
         for (side, up, end) in sides {
             let all = plan.cells.iter().flatten().map(|open| open[side]);
@@ -72,21 +72,22 @@ impl DoomMap {
     }
 }
 
-/// Columns and rows, each from the first to the one behind the last.
+/// Ranges of columns and rows, ends exclusive.
 type Cells = [[usize; 2]; 2];
 
-/// The map from above, in cells between the lines of its corners.
+/// Plan view of the map, in cells between the grid lines of its corners.
 struct Plan {
-    /// Ascending, by axis.
+    /// Grid lines by axis, ascending.
     lines: [Vec<i32>; 2],
     columns: usize,
-    /// Row by row: from the lowest floor to the highest ceiling of the sectors that
-    /// have a part in the open cell, if any has.
+    /// Lowest floor and highest ceiling of each open cell, row by row.
+    ///
+    /// These are of all sectors that have a part in the cell; `None` for a cell without one.
     cells: Vec<Option<[f64; 2]>>,
 }
 
 impl Plan {
-    /// `None` for a map in which some sector does not close.
+    /// Builds the plan; `None` if some sector of the map is not closed.
     fn of(map: &DoomMap) -> Option<Plan> {
         let lines = [0, 1].map(|axis| {
             let ends = map.lines.iter().flat_map(|line| line.ends);
@@ -129,10 +130,10 @@ impl Plan {
         }
     }
 
-    /// Tests whether the inside of a triangle and an open cell have a point in common.
+    /// Tests whether the interiors of a triangle and of a cell meet.
     ///
-    /// The triangle turns right, the cell is within its bounds: they do unless a side of the
-    /// triangle separates them.
+    /// The triangle turns right and the cell overlaps its bounds: the interiors meet unless a side
+    /// of the triangle separates them.
     fn meets(&self, [a, b, c]: [Point; 3], column: usize, row: usize) -> bool {
         let corner = |end: usize| [self.lines[0][column + end], self.lines[1][row + end]];
         let [[x, y], [u, v]] = [corner(0), corner(1)];
@@ -157,8 +158,9 @@ impl Plan {
         WorldBox::new(corner(0, low), corner(1, high))
     }
 
-    /// Rectangles of solid cells that cannot be made larger, the longest first, each
-    /// with a part of cells that are its `own` and in no earlier one.
+    /// Chooses maximal rectangles of solid cells, the longest first.
+    ///
+    /// Each must add enough area of `own` cells that no earlier one covers ([`LEAST_NEW`]).
     fn rectangles(&self, solid: &[bool], own: impl Fn(usize) -> bool) -> Vec<Cells> {
         let mut all: Vec<([f64; 2], Cells)> = Vec::new();
         for_each_maximal(solid, self.columns, |cells| {
@@ -201,9 +203,9 @@ impl Plan {
     }
 }
 
-/// Calls `found` with each rectangle of true cells that is part of no larger one.
+/// Calls `found` with each maximal rectangle of true cells.
 ///
-/// O(cells) by a stack of what is as deep as each row (the largest rectangle in a histogram).
+/// O(cells), with a stack of column depths per row (the largest rectangle in a histogram).
 fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(Cells)) {
     let mut deep = vec![0; columns];
     let mut open: Vec<(usize, usize)> = Vec::new();
@@ -250,7 +252,7 @@ mod tests {
         }
     }
 
-    /// A map of sectors that are rectangles one in the other, with their heights.
+    /// Map of nested rectangular sectors with their heights.
     ///
     /// A rectangle without heights is rock. The first one is the outline.
     fn nested(sectors: &[([i32; 4], Option<[f64; 2]>)]) -> DoomMap {
@@ -262,12 +264,12 @@ mod tests {
             .collect();
         let mut lines = Vec::new();
         for (place, ([x0, y0, x1, y1], _)) in sectors.iter().enumerate() {
-            // Clockwise: the inside is on the right.
+            // Clockwise: the interior is on the right.
             let corners = [[*x0, *y0], [*x0, *y1], [*x1, *y1], [*x1, *y0]];
             let around = (place > 0).then(|| numbers[0]).flatten();
             for (from, to) in (0..4).map(|k| (corners[k], corners[(k + 1) % 4])) {
                 let (ends, sides) = match numbers[place] {
-                    // Lines have their right side always.
+                    // A linedef always has a sector on its right.
                     None => ([to, from], [around, None]),
                     own => ([from, to], [own, around]),
                 };
@@ -297,7 +299,7 @@ mod tests {
             // Under the step up to its floor, over the beam down to its ceiling.
             [[200.0, 50.0, -8.0], [260.0, 120.0, 40.0]],
             [[300.0, 100.0, 60.0], [340.0, 200.0, 120.0]],
-            // And all of the plan below the lowest floor and above the highest ceiling.
+            // The whole plan below the lowest floor and above the highest ceiling.
             [[0.0, 0.0, -8.0], [400.0, 300.0, 0.0]],
             [[0.0, 0.0, 100.0], [400.0, 300.0, 120.0]],
         ] {
@@ -345,7 +347,7 @@ mod tests {
                 for _ in 0..200 {
                     let at = b.min + (b.max - b.min) * (rng.point() * 0.9998 + 0.0001);
                     assert!(!is_open(at), "{name}: {at} of {b:?}");
-                    // Beside it there is something open, mostly.
+                    // Usually there is something open beside the box.
                     let beside = b.min + (b.max - b.min) * (rng.point() * 1.4 - 0.2);
                     open += u32::from(is_open(beside));
                 }

@@ -1,7 +1,7 @@
-//! A map as triangles: walls and things as the items of its scene.
+//! Doom maps as triangles: walls and things are the items of the scene.
 //!
-//! Floors and ceilings follow the items; they hide too. They are triangulated seen from above
-//! in whole numbers, so that they meet each other and the walls exactly.
+//! Floors and ceilings follow the items; they hide too. They are triangulated in plan view with
+//! integers, so that they meet each other and the walls exactly.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::super::graph::RegionId;
 use super::DoomMap;
 use crate::scene::{Dispute, Linedef, Scene, Shape, SurfaceKind, Surfaces};
 
-/// The triangles of a scene's items, if they are no solid boxes.
+/// Triangles of a scene's items, unless they are solid boxes.
 ///
 /// Those of a map's floors and ceilings follow the items.
 pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
@@ -19,30 +19,27 @@ pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
     scene.surfaces.clone().or_else(of_map)
 }
 
-/// A part of a linedef's wall: the side that it faces, lower and upper height.
+/// Part of a linedef's wall: the side that it faces, lower and upper height.
 type Part = (usize, [f64; 2]);
 
 impl DoomMap {
-    /// The map as triangles; `scene` is its scene, as [`WadMap::into_scene`] makes it.
+    /// Triangles of the map; `scene` must come from [`WadMap::into_scene`].
     ///
-    /// Items are those of the scene, by the same numbers: each linedef as its walls,
-    /// seen from the side that they face, each thing as its box. A linedef of two sides
-    /// has a lower part where floors differ and an upper one where ceilings do; what
-    /// hangs between them (fences, bars) is left open. Things are sprites and hide
-    /// nothing. An item lies within its box.
+    /// Items are those of the scene, with the same ids: each linedef as its walls, visible from the
+    /// side that they face, and each thing as its box. A two-sided linedef has a lower part where
+    /// floors differ and an upper one where ceilings do; textures between them (fences, bars) are
+    /// left open. Things are sprites and hide nothing. An item lies inside its box.
     ///
-    /// Beyond the scene's items follows one for each sector, in file order: its floor,
-    /// its ceiling, and the walls about it where it moves.
+    /// After the scene's items follows one item for each sector, in file order: its floor, its
+    /// ceiling, and, if it moves, the walls around it.
     ///
-    /// Moving parts are open, as in [`DoomMap::graph`]: walls that end at a floor or
-    /// ceiling which moves are seen where the file has them but hide nothing there
-    /// (cut-outs); as far as they hide however it moves, they do as part of its
-    /// sector's item. Such a sector has no floor and no ceiling. Heights alone decide:
-    /// what is drawn as sky hides like any ceiling.
+    /// Moving parts are open, as in [`DoomMap::graph`]. Walls that end at a moving floor or ceiling
+    /// are visible where the file has them but hide nothing there (cut-outs); the part that hides
+    /// at every position of the sector belongs to the sector's item. Such a sector has no floor and
+    /// no ceiling. Only heights decide: a ceiling drawn as sky hides like any other.
     ///
-    /// A sector that its linedefs do not close, or of which they disagree where it is, has
-    /// no floor and no ceiling either, which only makes more visible;
-    /// [`DoomMap::unclosed`] lists them.
+    /// A sector whose linedefs do not close, or disagree about a place, has no floor and no ceiling
+    /// either, which can only make more visible; [`DoomMap::unclosed`] lists these.
     ///
     /// # Panics
     /// If the scene has fewer items than the map has linedefs.
@@ -72,10 +69,10 @@ impl DoomMap {
         for sector in 0..self.sectors.len() as RegionId {
             let mut shape = Shape::default();
             if self.moves(sector) {
-                // As far as they hide however it moves.
+                // Walls that hide at every position of the sector.
                 for line in &self.lines {
                     let moving = line.sectors.iter().flatten().filter(|&&s| self.moves(s));
-                    // Those between two such sectors belong to the lower number.
+                    // Walls between two moving sectors belong to the lower number.
                     if moving.min() == Some(&sector) {
                         let open = |of: RegionId| self.sectors[of as usize];
                         parts(line, open).for_each(|part| shape.wall(line, part));
@@ -94,16 +91,17 @@ impl DoomMap {
         all
     }
 
-    /// Sectors that have no floor and no ceiling as surfaces, as it is not known where
-    /// they are; ascending.
+    /// Sectors without surfaces of floor and ceiling, ascending.
+    ///
+    /// Their linedefs do not determine where they are.
     pub fn unclosed(&self) -> Vec<RegionId> {
         let sectors = 0..self.sectors.len() as RegionId;
         sectors.filter(|&s| self.triangles(s).is_none()).collect()
     }
 
-    /// The triangles of a sector, seen from above.
+    /// Triangles of a sector in plan view.
     ///
-    /// `None` if its linedefs do not close or disagree with others about a part of it.
+    /// `None` if its linedefs do not close, or disagree with others about a part of it.
     pub(super) fn triangles(&self, sector: RegionId) -> Option<Vec<[Point; 3]>> {
         let is_of = |dispute: &Dispute| dispute.sectors.contains(&Some(sector));
         match self.file.disputes().iter().any(is_of) {
@@ -118,7 +116,7 @@ impl DoomMap {
         self.sectors[sector] != self.file.sectors[sector].heights
     }
 
-    /// The linedefs about a sector, split at all of their ends.
+    /// Linedefs of a sector, split at each other's ends.
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let edges = &self.edges[sector as usize];
         let ends: Vec<Point> = edges.iter().map(|[from, _]| *from).collect();
@@ -126,12 +124,12 @@ impl DoomMap {
     }
 }
 
-/// The parts of a linedef's wall between sectors of these heights.
+/// Parts of a linedef's wall between sectors of these heights.
 fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterator<Item = Part> {
     let parts = match line.sectors.map(|sector| sector.map(&heights)) {
         [Some(a), Some(b)] => {
-            // The side of the lower floor sees the lower part, that of the higher
-            // ceiling the upper one.
+            // The lower part is visible from the side of the lower floor, the upper part from the
+            // side of the higher ceiling.
             let lower = (usize::from(b[0] < a[0]), [a[0].min(b[0]), a[0].max(b[0])]);
             let upper = (usize::from(b[1] > a[1]), [a[1].min(b[1]), a[1].max(b[1])]);
             [Some(lower), Some(upper)]
@@ -145,9 +143,9 @@ fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterato
     parts.filter(|(_, [low, high])| low < high)
 }
 
-/// The triangles of an item in the making, map coordinates.
+/// Triangles of an item under construction, map coordinates.
 ///
-/// Whole numbers of 17 bits, exact in f32.
+/// Integers of 17 bits, exact in f32.
 impl Shape {
     fn point(&mut self, [x, y]: [i32; 2], z: f64) -> u32 {
         self.points.push(Vec3::new(x as f32, y as f32, z as f32));
@@ -156,7 +154,7 @@ impl Shape {
 
     fn wall(&mut self, line: &Linedef, (side, [low, high]): Part) {
         let [mut from, mut to] = line.ends;
-        // Seen from the right, a linedef runs to the right.
+        // Seen from its right side, a linedef runs to the right.
         if side == 1 {
             (from, to) = (to, from);
         }
@@ -176,29 +174,30 @@ impl Shape {
     }
 }
 
-/// Map coordinates.
+/// Position in plan view, map coordinates.
 pub type Point = [i32; 2];
 
-/// Twice the area of a triangle, above zero where it turns to the left. Map
-/// coordinates have 16 bits, so nothing overflows.
+/// Twice the signed area of a triangle, positive if it turns left.
+///
+/// Map coordinates have 16 bits, so nothing overflows.
 pub fn turn(a: Point, b: Point, c: Point) -> i64 {
     let minus = |p: Point| [0, 1].map(|k| i64::from(p[k]) - i64::from(a[k]));
     let ([x, y], [u, v]) = (minus(b), minus(c));
     x * v - y * u
 }
 
-/// Tests for a point in a closed triangle that turns right, other than its corners.
+/// Tests for a point in a closed triangle that turns right, corners excluded.
 fn holds([a, b, c]: [Point; 3], p: Point) -> bool {
     p != a && p != b && p != c && turn(a, b, p) <= 0 && turn(b, c, p) <= 0 && turn(c, a, p) <= 0
 }
 
-/// Tests whether two segments cross in a point that is the end of neither.
+/// Tests whether two segments cross in a point that is an end of neither.
 fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     turn(a, b, c).signum() * turn(a, b, d).signum() < 0
         && turn(c, d, a).signum() * turn(c, d, b).signum() < 0
 }
 
-/// The parts of an edge between those of some points that lie on it.
+/// Splits an edge at those of some points that lie on it.
 pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     let away = |p: Point| [0, 1].map(|k| (p[k] - from[k]).abs()).iter().sum::<i32>();
     let within =
@@ -211,13 +210,13 @@ pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     stops.windows(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
-/// Cuts the polygons on the right of all edges into triangles that turn right.
+/// Triangulates the polygons on the right of all edges; triangles turn right.
 ///
-/// Polygons may have holes. `None` where the edges do not close, cross, or one
-/// has a corner of another between its ends.
+/// Polygons may have holes. `None` if the edges do not close, cross, or a corner lies in the
+/// interior of another edge.
 ///
-/// A front advances from edge to edge: each triangle takes an edge and a corner that
-/// it sees, and leaves less. O(n^2) for each of n triangles at worst, about O(n).
+/// An advancing front: each triangle takes an edge and a corner visible from it, and leaves a
+/// smaller polygon. For each of n triangles O(n^2) at worst, usually about O(n).
 pub fn triangles(edges: &[[Point; 2]]) -> Option<Vec<[Point; 3]>> {
     let mut degrees: Vec<(Point, i32)> = Vec::new();
     for [from, to] in edges {
@@ -249,12 +248,12 @@ pub fn triangles(edges: &[[Point; 2]]) -> Option<Vec<[Point; 3]>> {
             })
         };
         let c = corners.into_iter().find(sees)?;
-        // A hole adds two to the triangles of its corners: beyond this, edges cross.
+        // A hole adds two triangles to those of its corners; more than this means that edges cross.
         if made.len() > 2 * edges.len() {
             return None;
         }
         made.push([a, b, c]);
-        // The part beyond the new sides remains, unless they were sides already.
+        // The new sides bound the remaining polygon, unless they were sides already.
         for (side, back) in [([a, c], [c, a]), ([c, b], [b, c])] {
             match front.iter().position(|edge| *edge == back) {
                 Some(place) => drop(front.swap_remove(place)),
@@ -284,7 +283,7 @@ mod tests {
         let all: i64 = made.iter().map(|&[a, b, c]| -turn(a, b, c)).sum();
         assert_eq!(all, area(edges));
         assert!(made.iter().all(|&[a, b, c]| turn(a, b, c) < 0));
-        // None overlaps another: no sides cross, none holds another's middle.
+        // Triangles do not overlap: no sides cross, and none contains another's centre.
         let sides = |[a, b, c]: [Point; 3]| [[a, b], [b, c], [c, a]];
         for (i, &one) in made.iter().enumerate() {
             for &other in &made[..i] {
@@ -312,7 +311,7 @@ mod tests {
             [6, 9],
             [6, 0],
         ]));
-        // A hole, and in the hole another floor.
+        // A hole, and another floor inside the hole.
         let mut edges = ring(&[[0, 0], [0, 9], [9, 9], [9, 0]]);
         edges.extend(ring(&[[2, 2], [7, 2], [7, 7], [2, 7]]));
         check(&edges);
@@ -323,7 +322,7 @@ mod tests {
         edges.extend(ring(&[[4, 4], [4, 8], [8, 8], [8, 4]]));
         edges.extend(ring(&[[0, 0], [2, 1], [1, 2]]));
         check(&edges);
-        // Corners in one line.
+        // Collinear corners.
         check(&ring(&[[0, 0], [0, 2], [0, 4], [3, 4], [3, 0], [1, 0]]));
     }
 
@@ -332,11 +331,11 @@ mod tests {
         let mut edges = ring(&[[0, 0], [0, 4], [4, 4], [4, 0]]);
         edges.pop();
         assert_eq!(triangles(&edges), None);
-        // The wrong way round: nothing is on the right.
+        // Wrong orientation: nothing is on the right.
         let edges = ring(&[[0, 0], [4, 0], [4, 4], [0, 4]]);
         assert_eq!(triangles(&edges), None);
         assert_eq!(triangles(&[]), Some(Vec::new()));
-        // Whatever the edges, it comes to an end.
+        // Terminates for any edges.
         let mut rng = crate::scene::SeededRng::new(9);
         for _ in 0..300 {
             let corners = [(); 9].map(|()| [(); 2].map(|()| rng.below(6) as i32));
