@@ -1,4 +1,4 @@
-//! Memory and rows that are missing, with the reason.
+//! Memory checks, and missing rows with their reasons.
 
 use serde::Serialize;
 
@@ -7,20 +7,20 @@ use crate::scene::memory::{available_bytes, fits_into};
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::Rectangle;
 
-/// Refuses a step that needs more memory than is free.
+/// Rejects a step that needs more memory than is free.
 pub(crate) fn check_memory(step: &str, needed: u64) -> Result<(), InputError> {
     let told = [step, "", "fewer items or views"];
     fits_into(available_bytes(), told, needed)
 }
 
-/// A row that is left out of a section of the report.
+/// A row that is missing from a section of the report.
 #[derive(Clone, Debug, Serialize)]
 pub struct LeftOutRow {
-    /// The section: `stages` or `picks`.
+    /// Section of the report: `stages` or `picks`.
     pub section: &'static str,
-    /// A back end, a structure, a stage without any, or `all` of the section.
+    /// Name of a back end or structure, of a stage, or `all` of the section.
     pub name: String,
-    /// The reason, as a sentence without its period.
+    /// Reason, as a sentence without a period.
     pub reason: String,
 }
 
@@ -34,17 +34,17 @@ impl LeftOutRow {
     }
 }
 
-/// Mean layers of a large image that are drawn at most; of smaller images more.
+/// Most layers drawn over a large image, on average; smaller images may have more.
 const MOST_LAYERS: u64 = 16;
-/// Samples of a large image.
+/// Number of samples of a large image.
 const LARGE: u64 = 1 << 20;
 
-/// Most samples that are drawn in an image, those of each item counted.
+/// Most samples drawn in an image, summed over the items.
 pub fn most_drawn(grid: SampleGrid) -> u64 {
     MOST_LAYERS * (grid.samples() as u64).max(LARGE)
 }
 
-/// Refuses to draw items that cover too many samples of an image.
+/// Rejects items that cover too many samples of an image in total.
 pub fn fits_drawing(
     grid: SampleGrid,
     rectangles: impl Iterator<Item = Rectangle>,

@@ -1,6 +1,6 @@
-//! Fragment stage: tests of which remaining item is in front at each sample.
+//! Fragment stage: tests for the remaining item in front at each sample.
 //!
-//! Each test counts the samples and fragments that it takes.
+//! Counts the samples and fragments of each test.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -21,11 +21,11 @@ use crate::visibility::Rays;
 use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests};
 use crate::visibility::truth::{Facet, SolidBox};
 
-/// Samples and fragments of a test, means per view.
+/// Samples and fragments of a test, as means per view.
 pub type FragmentCounts = Tally<f64>;
 
 impl FragmentCounts {
-    /// `None` without views.
+    /// Means of the tallies of all views; `None` without views.
     pub(super) fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
         let views = tallies.len() as f64;
         let mean = |of: fn(&Tally) -> u64| tallies.iter().map(of).sum::<u64>() as f64 / views;
@@ -40,18 +40,18 @@ impl FragmentCounts {
     }
 }
 
-/// Items that the chain leaves, to be drawn.
+/// Geometry of the items that the chain leaves, to be drawn.
 ///
-/// Boxes as they are; of a mesh or a map the triangles that the triangle stage leaves, and
-/// floors and ceilings.
+/// Boxes as they are; for a mesh or a map the triangles that the triangle stage leaves, plus floors
+/// and ceilings.
 pub struct FragmentStage<'w> {
     world: &'w World<'w>,
     left: Left<'w>,
-    /// Reason for which nothing is drawn.
+    /// Reason if nothing is drawn.
     pub too_much: Option<String>,
 }
 
-/// Geometry of every view, and the memory of an image.
+/// Geometry of each view, and the reused memory of an image.
 enum Left<'w> {
     Boxes(Vec<Boxes>, RefCell<Option<(Canvas, Drawn)>>),
     Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
@@ -60,7 +60,7 @@ enum Left<'w> {
 type TriangleImage = RefCell<Option<(Canvas<Facet>, Drawn<Facet>)>>;
 
 impl Left<'_> {
-    /// Refuses a view that covers too many samples.
+    /// Rejects a view that covers too many samples.
     fn fits(&self, world: &World, view: usize) -> Result<(), String> {
         let screen = Screen::of(world.rays(view), world.samples);
         match self {
@@ -79,7 +79,7 @@ impl Left<'_> {
 }
 
 impl<'w> FragmentStage<'w> {
-    /// The remaining items, of whose triangles the back end `triangle` removes some.
+    /// Collects the remaining items, with triangles culled by the back end `triangle`.
     pub fn new(
         stages: &ItemStages<'w>,
         (triangles, triangle): (&TriangleStage, &str),
@@ -112,7 +112,7 @@ impl<'w> FragmentStage<'w> {
         }
     }
 
-    /// Draws a view by a test; appends the items that are in front at any sample.
+    /// Draws a view with a test; appends the items in front at any sample.
     fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> Tally {
         let (rays, grid) = (self.world.rays(view), self.world.samples);
         match &self.left {
@@ -138,7 +138,7 @@ impl<'w> FragmentStage<'w> {
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays);
                 drawn.draw_triangles(canvas, surfaces, &views[view]);
-                // Floors and ceilings of a map come behind its items.
+                // Floors and ceilings of a map follow its items.
                 let items = self.world.items() as ItemId;
                 let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.filter(|item| *item < items));
@@ -147,8 +147,9 @@ impl<'w> FragmentStage<'w> {
         }
     }
 
-    /// No test, and those that are drawn: compared rows, and the test that others are
-    /// measured against.
+    /// Rows of the stage: `none`, and the tests to be drawn.
+    ///
+    /// The latter are the compared rows and the default test, the baseline of the others.
     fn tests(&self) -> impl Iterator<Item = BackEnd> {
         let world = self.world;
         let compared = world.rows(StageKind::Fragment);
@@ -171,7 +172,7 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// No test and every test of the remaining items; with tallies of the views drawn.
+    /// Applies `none` and each test to the remaining items; tallies of drawn views.
     pub fn tested(&self, stages: &ItemStages, truth: &Truth) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
         let world = self.world;
         let tested = self.tests().map(|back_end| {
@@ -197,17 +198,17 @@ struct Boxes {
     room: Option<Room>,
 }
 
-/// Rooms of an eye in rooms, for the stencil-test.
+/// Rooms around an eye that is in rooms, for the stencil test.
 struct Room {
-    /// Flat boxes.
+    /// Portals as flat boxes.
     portals: Vec<WorldBox>,
-    /// Items that meet the rooms.
+    /// Boxes that meet the rooms.
     near: Vec<SolidBox>,
     beyond: Vec<SolidBox>,
 }
 
 impl Boxes {
-    /// Replaces the image by that of a test; `surfaces` may have holes.
+    /// Redraws the image with a test; `surfaces` may have holes.
     fn draw(&self, test: &str, surfaces: Option<&Holes>, canvas: &Canvas, drawn: &mut Drawn) {
         drawn.clear();
         let tests = Tests {
@@ -218,7 +219,7 @@ impl Boxes {
             None => drawn.draw(canvas, self.bodies.iter().copied(), &tests),
             Some(room) => {
                 drawn.draw(canvas, room.near.iter().copied(), &tests);
-                // Samples that see a portal before everything that is drawn already.
+                // Samples whose ray reaches a portal before everything drawn so far.
                 let stencil = drawn.stencil(canvas, &room.portals);
                 drawn.tally.asked_count += stencil.tested;
                 let stencil = Some(&stencil);
@@ -230,7 +231,7 @@ impl Boxes {
 }
 
 impl Room {
-    /// `None` for an eye that is in no room.
+    /// Rooms of the eye; `None` if it is in no room.
     fn of(world: &World, rays: &Rays, bodies: &[SolidBox]) -> Option<Room> {
         let regions = world.regions.as_ref()?;
         let graph = &regions.graph;

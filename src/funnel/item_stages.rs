@@ -1,4 +1,4 @@
-//! Stages of whole items: their back ends, and the items that chains of them leave.
+//! Stages of whole items: their back ends, and the items that chains leave.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -13,11 +13,11 @@ use crate::query::ItemId;
 use crate::visibility::occlusion;
 use crate::visibility::region::{IdSet, Scratch};
 
-/// Appends the items of a view that a stage leaves of those given (`None`: all).
+/// Appends the items that a stage leaves; the argument is its input (`None`: all).
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 impl World<'_> {
-    /// A back end of a stage of whole items, behind some steps.
+    /// Back end of a stage of whole items, after the steps `before`.
     ///
     /// # Panics
     /// If there is no such back end.
@@ -51,7 +51,7 @@ impl World<'_> {
             let Some(items) = input else {
                 return index.visible(volume, out);
             };
-            // A structure searches the whole scene.
+            // A structure always searches the whole scene.
             let (marks, found) = &mut *state.borrow_mut();
             found.clear();
             index.visible(volume, found);
@@ -80,17 +80,17 @@ impl World<'_> {
     }
 }
 
-/// Items that the back ends of the item stages leave of each view.
+/// Items that remain in each view after the back ends of the item stages.
 pub struct ItemStages<'w> {
     pub world: &'w World<'w>,
-    /// The stages whose items remain.
+    /// Steps of the chain, whose items remain.
     steps: Vec<Step>,
-    /// Ascending ids of every view, with the steps behind which they are left.
+    /// Ascending ids for each view, keyed by the steps that leave them.
     left: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
 }
 
 impl<'w> ItemStages<'w> {
-    /// Runs a chain, which leaves what remains, and all chains with one other stage.
+    /// Runs a chain and all chains that differ from it in one stage.
     pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
         let mut all = ItemStages {
             world,
@@ -109,7 +109,7 @@ impl<'w> ItemStages<'w> {
         all
     }
 
-    /// Runs stages one after the other, those that were run before only once.
+    /// Runs steps in order, each sequence only once.
     fn run(&mut self, steps: &[Step]) {
         let Some(((stage, name), before)) = steps.split_last() else {
             return;
@@ -129,7 +129,7 @@ impl<'w> ItemStages<'w> {
         self.left.push((steps.to_vec(), output));
     }
 
-    /// Items of each view behind some steps; `None` for all items, without steps.
+    /// Items of each view after some steps; `None` means all items (no steps).
     fn behind(&self, steps: &[Step]) -> Option<&[Vec<ItemId>]> {
         let found = self.left.iter().find(|(own, _)| own == steps);
         let left = found.map(|(_, left)| &left[..]);
@@ -137,12 +137,12 @@ impl<'w> ItemStages<'w> {
         left
     }
 
-    /// Items of a view behind some steps; `None` for all items, without steps.
+    /// Items of a view after some steps; `None` means all items (no steps).
     pub fn items(&self, steps: &[Step], view: usize) -> Option<&[ItemId]> {
         self.behind(steps).map(|left| &left[view][..])
     }
 
-    /// Remaining items of a view; `None` for all items.
+    /// Remaining items of a view; `None` means all items.
     pub fn remaining(&self, view: usize) -> Option<&[ItemId]> {
         self.items(&self.steps, view)
     }
@@ -152,7 +152,7 @@ impl<'w> ItemStages<'w> {
         self.world.listed(self.remaining(view))
     }
 
-    /// Mean number of items that a chain leaves, over the views.
+    /// Mean number of items per view that a chain leaves.
     pub fn mean_count(&self, chain: &Chain) -> f64 {
         let steps = chain.steps();
         let left = self.world.views().map(|view| self.items(&steps, view));
@@ -160,7 +160,7 @@ impl<'w> ItemStages<'w> {
         counts.sum::<f64>() / self.world.views.len().max(1) as f64
     }
 
-    /// Counts of the last of some steps in every view.
+    /// Counts of the last of some steps in each view.
     pub fn counts(&self, before: &[Step], steps: &[Step], truth: &Truth) -> Vec<ViewCounts> {
         let views = self.world.views();
         let count = |view: usize| {
@@ -171,7 +171,7 @@ impl<'w> ItemStages<'w> {
         views.map(count).collect()
     }
 
-    /// Every step that was run.
+    /// Tasks of all steps that were run.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.left.iter().map(|(steps, _)| {
             let ((stage, name), before) = steps.split_last().expect("at least one step");
@@ -184,7 +184,7 @@ impl<'w> ItemStages<'w> {
         })
     }
 
-    /// Tasks of a chain whose times add up.
+    /// Tasks of a chain; their times add up.
     pub fn timed(&self, chain: &Chain) -> Vec<FunnelKey> {
         let steps = chain.steps();
         let is_timed = |end: &usize| chain.is_separate(steps[end - 1].0);
@@ -194,30 +194,30 @@ impl<'w> ItemStages<'w> {
     }
 }
 
-/// The stage that removed an item, or the item's visibility.
+/// Outcome for an item: the stage that removed it, or its visibility.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Fate {
-    /// A stage removed it.
+    /// Removed by a stage.
     Removed(StageKind),
-    /// Every stage kept it, and no sample sees it.
+    /// Kept by all stages, but not visible at any sample.
     Kept,
-    /// In front at a sample.
+    /// Kept, and in front at a sample.
     Visible,
-    /// In front at a sample, and removed.
+    /// Removed, although in front at a sample.
     Lost,
 }
 
-/// The view that sees most items, with the fate of each.
+/// The view with the most visible items, and the fate of each item.
 #[derive(Clone, Default, Debug)]
 pub struct PlanView {
-    /// Its camera; `None` if there is no view.
+    /// Camera of the view; `None` without views.
     pub camera: Option<Camera>,
     /// Fates by item.
     pub fates: Vec<Fate>,
 }
 
 impl PlanView {
-    /// The first of the views that see most, behind the item stages of a chain.
+    /// First of the views with the most visible items, under a chain's item stages.
     pub fn of(world: &World, stages: &ItemStages, chain: &Chain, truth: &Truth) -> PlanView {
         let both = world.views.iter().zip(truth).enumerate();
         let most = both.rev().max_by_key(|(_, (_, visible))| visible.len());
@@ -238,7 +238,7 @@ impl PlanView {
     }
 }
 
-/// Fate of an item, from the ascending items behind each stage (`None`: all items).
+/// Fate of an item, from the ascending ids after each stage (`None`: all items).
 fn fate(item: ItemId, left: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> Fate {
     let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
     let removed = left.iter().find(|(_, set)| lacks(set));

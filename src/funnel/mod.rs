@@ -1,11 +1,11 @@
-//! The funnel of a scene and a path: stages with interchangeable back ends.
+//! Culling funnel of a scene and a path: stages with interchangeable back ends.
 //!
-//! Level, region, object, occlusion, triangle and fragment, each compared with the exact truth
-//! and timed. The back ends are in [`crate::visibility`]; this module reads them off.
+//! Level, region, object, occlusion, triangle and fragment, each compared with the exact truth and
+//! timed. The back ends are in [`crate::visibility`]; this module measures them.
 //!
-//! A [`Chain`] names a back end for each stage. The study compares it with every chain
-//! that differs from it in one stage: [`prepare`] counts, [`time`] measures in each
-//! process, [`Prepared::conclude`] combines both.
+//! A [`Chain`] names a back end for each stage. The study compares it with every chain that differs
+//! from it in one stage: [`prepare`] counts, [`time`] measures in each process,
+//! [`Prepared::conclude`] combines both.
 
 mod error;
 mod fragment_stage;

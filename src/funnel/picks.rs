@@ -1,8 +1,7 @@
 //! Picking at the cursors of every view.
 //!
-//! Every back end finds the first and the nearest items along rays, every structure of the
-//! object stage everything in the frustum of a cursor. All answers are compared with the
-//! exact ones.
+//! Every back end finds the first and the nearest items along rays; every structure of the object
+//! stage finds everything in the frustum of a cursor. All answers are compared with the exact ones.
 
 use std::rc::Rc;
 
@@ -22,34 +21,34 @@ use crate::visibility::pick::{CursorRectangle, Pick};
 use crate::visibility::truth::{Bodies, Body, Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
-/// Cursors of a view.
+/// Grid of cursors of a view.
 const CURSORS: SampleGrid = SampleGrid::new(16, 9);
-/// Most items of which every one is tested for each ray, or each cursor's frustum.
+/// Most bodies for linear search, per ray or per cursor's frustum.
 const MOST_FOR_LOOP: usize = 20_000;
 /// Half width of a cursor's frustum, pixels.
 const REACH: f64 = 4.0;
-/// Number of nearest items.
+/// Number of nearest items requested.
 pub const NEAREST: usize = 8;
 
-/// A back end of picking over all views.
+/// Results of one picking back end over all views.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct PickRow {
-    /// The question that it answers.
+    /// Question that the back end answers.
     pub question: PickQuestion,
-    /// Name in the table of back ends, or of the structure.
+    /// Name of the back end in its table, or label of the structure.
     pub name: String,
-    /// One line about it.
+    /// One-line description.
     pub summary: &'static str,
     /// Declared guarantee of its answers.
     pub guarantee: Guarantee,
-    /// Cursors of all views.
+    /// Number of cursors in all views.
     pub ray_count: usize,
-    /// Cursors for which the answer is not the exact one.
+    /// Number of cursors with a wrong answer.
     pub wrong_count: usize,
-    /// Thread CPU time of all cursors of a view.
+    /// Thread CPU time per view, for all cursors.
     #[serde(flatten, serialize_with = "flat::stage_ns")]
     pub time: Option<Estimate>,
-    /// The same per cursor.
+    /// Thread CPU time per cursor.
     pub ns_per_ray: Option<f64>,
 }
 
@@ -67,12 +66,13 @@ impl PickRow {
 /// Appends the answer at a cursor of a view.
 type Answer<'w> = Box<dyn Fn(&Cursor, &mut Vec<ItemId>) + 'w>;
 
-/// A ray and a rectangle of the image.
+/// A cursor: its ray, and a small rectangle of the image around it.
 struct Cursor {
     ray: Ray,
     rectangle: CursorRectangle,
-    /// Frustum of the rectangle; `None` where f64 cannot tell it from a point, which
-    /// holds nothing.
+    /// Frustum of the rectangle.
+    ///
+    /// `None` if f64 cannot distinguish the rectangle from a point, which contains nothing.
     volume: Option<ConvexVolume>,
 }
 
@@ -81,12 +81,12 @@ pub struct Picks<'w> {
     world: &'w World<'w>,
     pickers: Vec<(PickRow, Answer<'w>)>,
     cursors: Vec<Vec<Cursor>>,
-    /// Plain loops over too many bodies.
+    /// Linear searches left out because they have too many bodies.
     pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'w> Picks<'w> {
-    /// Builds every back end but loops over too many bodies.
+    /// Builds all back ends, except linear searches over too many bodies.
     pub fn new(world: &'w World<'w>) -> Picks<'w> {
         let around = world.scene.surroundings();
         let of_view = |view| cursors(world.rays(view), world.samples, &around);
@@ -107,7 +107,7 @@ impl<'w> Picks<'w> {
         picks
     }
 
-    /// Adds back ends along rays: rows of the first item, then of the nearest.
+    /// Adds the ray back ends: rows for the first item, then for the nearest.
     fn add_rays<B: Body>(&mut self, all: &Bodies<B>, one: &str) {
         let bodies = all.all.len();
         for row in Bodies::<B>::BACK_ENDS {
@@ -138,7 +138,7 @@ impl<'w> Picks<'w> {
         self.pickers.sort_by_key(|(row, _)| row.question);
     }
 
-    /// Adds structures of the object stage, by the frusta of the cursors.
+    /// Adds the structures of the object stage, queried with the cursors' frusta.
     fn add_frusta(&mut self) {
         let world = self.world;
         for (spec, index) in &world.structures {
@@ -165,7 +165,7 @@ impl<'w> Picks<'w> {
         }
     }
 
-    /// Every row; the ids are the answers at all cursors of a view in turn.
+    /// Tasks of all rows; a task answers all cursors of a view in turn.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.pickers.iter().map(move |(row, answer)| {
             let ask: Ask = Box::new(move |view, out| {
@@ -177,10 +177,10 @@ impl<'w> Picks<'w> {
         })
     }
 
-    /// Every row, compared with the exact answers.
+    /// Compares all rows with the exact answers.
     ///
-    /// Those of the tree that wide-ray searches too; in scenes that are small enough, linear
-    /// shares nothing with it and is compared as well.
+    /// The exact answers come from the tree that wide-ray searches too; in small enough scenes,
+    /// linear, which shares nothing with that tree, is compared as well.
     pub fn compared(&self) -> Vec<PickRow> {
         let exact: Box<dyn Pick> = match &self.world.shape {
             Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),
@@ -224,14 +224,14 @@ impl<'w> Picks<'w> {
     }
 }
 
-/// The plain loop as left out.
+/// Left-out row of a linear search.
 fn too_many(name: &str, bodies: usize, one: &str, when: &str) -> LeftOutRow {
     let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
     let reason = format!("{found} to test {when}; expected at most {most}");
     LeftOutRow::new("picks", name, reason)
 }
 
-/// Cursors at the centres of a grid over the image.
+/// Cursors at the cell centres of a grid over the image.
 fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor> {
     let size = [image.width, image.height].map(f64::from);
     let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
@@ -252,17 +252,18 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
 /// Exact answers at a cursor.
 struct Truth {
     first: Vec<ItemId>,
-    /// In the order of depth, then of ids.
+    /// Sorted by depth, then by id.
     nearest: Vec<ItemId>,
-    /// Items that some rays through the rectangle meet, ascending: none may be missing.
+    /// Items met by sample rays through the rectangle, ascending: a lower bound.
     met: Vec<ItemId>,
-    /// Items that no plane of the rectangle's frustum excludes, ascending; `None` where
-    /// there are too many items to test each.
+    /// Items that no plane of the rectangle's frustum excludes, ascending.
+    ///
+    /// `None` if there are too many items to test each.
     in_planes: Option<Vec<ItemId>>,
 }
 
 impl Truth {
-    /// Returns `true` if an answer is the exact one; sorts a set.
+    /// Returns `true` if an answer is exact; sorts an answer that is a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
             PickQuestion::First => *answer == self.first[..],
@@ -277,7 +278,7 @@ impl Truth {
     }
 }
 
-/// Items that the rays through corners, edges and middle of a rectangle meet.
+/// Items met by rays through corners, edge midpoints and centre of a rectangle.
 fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
     let CursorRectangle { min, max } = rectangle;
     let middle = [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
@@ -294,7 +295,7 @@ fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec
 mod tests {
     use super::*;
 
-    /// An answer that lacks one item, has one too many or another order is wrong.
+    /// A missing item, an extra item or a different order makes an answer wrong.
     #[test]
     fn answers_are_held_against_the_exact_ones() {
         let truth = Truth {

@@ -1,4 +1,4 @@
-//! Report of a study as it is shown and written, with conclusions in sentences.
+//! Report of a study as shown and written, with conclusions in sentences.
 
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ pub struct FunnelReport {
     pub skipped_items: usize,
     /// Number of views.
     pub views: usize,
-    /// Number of cameras of the path, of which the views are an even choice.
+    /// Number of cameras of the path; the views are evenly spread over them.
     pub cameras: usize,
     /// Columns and rows of samples of a view.
     pub samples: [u32; 2],
@@ -39,33 +39,33 @@ pub struct FunnelReport {
     pub level: Level,
     /// Items that have holes; null unless requested.
     pub cut_outs: Option<CutOutRow>,
-    /// The chain; each stage of [`FunnelReport::stages`] gets the items that it leaves.
+    /// Measured chain; [`FunnelReport::stages`] vary one of its stages at a time.
     pub chain: Chain,
-    /// Every stage with every back end.
+    /// Every back end of every stage.
     pub stages: Vec<StageRow>,
-    /// Occluding boxes inside the items of a mesh; null for other scenes.
+    /// Occluder boxes inside the items of a mesh; null for other scenes.
     pub inner_boxes: Option<InnerRow>,
-    /// Occluding boxes in the solid of a map; null for other scenes.
+    /// Occluder boxes in the solid space of a map; null for other scenes.
     pub solid_blocks: Option<BlocksRow>,
-    /// Occluding boxes below the ground of a mesh; null for a scene without ground.
+    /// Occluder boxes below the ground of a mesh; null for a scene without ground.
     pub ground: Option<GroundRow>,
-    /// Items under a cursor, by every back end of picking and every structure.
+    /// Results of picking, by back end and structure.
     pub picks: Vec<PickRow>,
     /// Missing rows, each with its reason.
     pub left_out: Vec<LeftOutRow>,
-    /// Each stage of the chain, with it and without it.
+    /// Each stage of the chain, compared with the chain without it.
     pub gains: Vec<Gain>,
     /// Conclusions, a sentence each.
     pub conclusions: Vec<String>,
     /// Warnings about the cameras in the scene.
     pub warnings: Vec<String>,
-    /// The view that sees most, from above.
+    /// The view with the most visible items, from above.
     #[serde(skip)]
     pub plan_view: PlanView,
 }
 
 impl FunnelReport {
-    /// Returns `true` for a task of the chain or of the chain without a stage.
+    /// Returns `true` for a task of the chain, or of the chain without one stage.
     pub(super) fn needs(&self, key: &FunnelKey) -> bool {
         let mut chosen = self.stages.iter().filter(|row| row.is_chosen);
         let mut of_gains = self.gains.iter().flat_map(|gain| &gain.tasks);
@@ -74,44 +74,44 @@ impl FunnelReport {
     }
 }
 
-/// The items that have holes.
+/// Items with holes.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct CutOutRow {
-    /// Their mask, share and seed.
+    /// Mask, share and seed as typed.
     #[serde(flatten)]
     pub typed: CutOuts,
     /// Number of items with holes.
     pub item_count: usize,
 }
 
-/// A stage done by a back end.
+/// Results of one back end of a stage.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct StageRow {
     /// The back end.
     #[serde(flatten)]
     pub back_end: BackEnd,
-    /// The structure of the object stage; `null` elsewhere.
+    /// Structure of the object stage; null for other stages.
     pub structure: Option<String>,
     /// `true` for a back end of the chain.
     pub is_chosen: bool,
     /// Unit of the counts: items or triangles.
     pub unit: &'static str,
-    /// Errors against the truth.
+    /// Errors compared with the truth.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Thread CPU time of a view.
+    /// Thread CPU time per view.
     #[serde(flatten, serialize_with = "flat::stage_ns")]
     pub time: Option<Estimate>,
-    /// Time / removed candidates: drawing one must cost more for the stage to pay.
+    /// Time / removed candidates: the stage pays if drawing one costs more.
     pub ns_per_removed: Option<f64>,
     /// Time / candidates.
     pub ns_per_decided: Option<f64>,
-    /// Samples and fragments of a test of the fragment stage; null elsewhere.
+    /// Samples and fragments of a fragment test; null for other stages.
     pub fragments: Option<FragmentCounts>,
 }
 
 impl StageRow {
-    /// A row without times, done in its place in a chain.
+    /// A row without times, for a back end at its place in a chain.
     pub(super) fn new(back_end: BackEnd, name: &str, chain: &Chain, errors: Errors) -> StageRow {
         StageRow {
             structure: (back_end.name != name).then(|| name.to_owned()),
@@ -123,7 +123,7 @@ impl StageRow {
         }
     }
 
-    /// A sentence on the visible items that it drops; `None` if it drops none.
+    /// Sentence on the visible items that it drops; `None` if it drops none.
     pub fn loss(&self) -> Option<String> {
         let errors = &self.errors;
         (errors.false_negative_count > 0.0).then(|| {
@@ -137,7 +137,7 @@ impl StageRow {
         })
     }
 
-    /// Its task in its place in a chain; `None` for [`NONE`].
+    /// Task of the back end at its place in a chain; `None` for [`NONE`].
     pub(super) fn key(&self, chain: &Chain) -> Option<FunnelKey> {
         let name = self.structure.as_deref().unwrap_or(self.back_end.name);
         match self.back_end.stage {
@@ -160,24 +160,24 @@ impl StageRow {
     }
 }
 
-/// Worth of a stage where all others are as in the chain.
+/// Benefit of a stage, with all other stages as in the chain.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct Gain {
-    /// The stage that is left out on the other side.
+    /// Stage that is compared with leaving it out.
     pub stage: StageKind,
-    /// Its back end.
+    /// Back end of the stage.
     pub back_end: String,
     /// Unit of the counts: items, triangles or shaded fragments.
     pub unit: &'static str,
-    /// Time of a view: all stages of whole items, and the stage itself.
+    /// Time per view of all stages of whole items, plus the stage itself.
     pub with_ns: Option<f64>,
-    /// The same without the stage.
+    /// Time per view without the stage.
     pub without_ns: Option<f64>,
     /// Count at the end of the chain, per view.
     pub with_count: f64,
-    /// The same without the stage.
+    /// Count without the stage, per view.
     pub without_count: f64,
-    /// Extra time / removed candidates, the least draw cost for which the stage pays.
+    /// Extra time / removed candidates: the least draw cost for which the stage pays.
     ///
     /// 0 if it saves time as well; null if it removes nothing or has no time.
     #[serde(flatten, serialize_with = "flat::break_even_ns")]
@@ -185,13 +185,13 @@ pub struct Gain {
     /// Time with the stage / time without it.
     #[serde(skip)]
     pub ratio: Option<Estimate>,
-    /// Tasks with the stage, and without it.
+    /// Tasks with the stage and without it.
     #[serde(skip)]
     pub(super) tasks: [Vec<FunnelKey>; 2],
 }
 
 impl Gain {
-    /// A gain without times, from counts and tasks with the stage and without it.
+    /// A gain without times, from counts and tasks with and without the stage.
     pub(crate) fn new(
         stage: StageKind,
         (back_end, unit): (&str, &'static str),
@@ -209,7 +209,7 @@ impl Gain {
         }
     }
 
-    /// Candidates that the stage removes in the end, per view.
+    /// Net number of candidates that the stage removes, per view.
     pub fn removed(&self) -> f64 {
         self.without_count - self.with_count
     }
@@ -234,9 +234,9 @@ impl Gain {
     }
 }
 
-/// Sum of the times of some tasks in each process, ns.
+/// Summed times of some tasks in each process, ns.
 ///
-/// 0 without tasks, empty if one of them has no times.
+/// 0 without tasks; empty if one of them has no times.
 fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
     let logs: Vec<Vec<f64>> = tasks.iter().map(|key| times.ln_ns(key)).collect();
     let sum = |process: usize| {
@@ -247,9 +247,9 @@ fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
     sums.unwrap_or_default()
 }
 
-/// Remaining items and the worth of each stage in a paragraph, then sentences.
+/// Conclusions: remaining items and the benefit of each stage, then sentences.
 ///
-/// The sentences are on back ends that lost items, and the stencil.
+/// The sentences are about back ends that lost items, and about the stencil.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
     let last = report.stages.iter().find(is_last);
@@ -279,9 +279,9 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences
 }
 
-/// A sentence on a stage; lost visible items are no savings.
+/// Sentence on a stage; a stage that loses visible items saves nothing.
 ///
-/// None on the depth test, which costs a GPU next to nothing.
+/// `None` for the depth test, which costs a GPU next to nothing.
 fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String> {
     if gain.stage == StageKind::Fragment {
         return None;
@@ -303,7 +303,7 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String>
     let hidden = errors.map(|errors| errors.output_count - errors.truth_count);
     Some(match (gain.break_even, hidden.filter(|_| is_occlusion)) {
         (None, _) if gain.removed() > 0.0 => return None,
-        // What nothing is found to hide may well be hidden.
+        // Items may be hidden even if no occluder is found to hide them.
         (None, Some(hidden)) if hidden > 0.0 => {
             let why = [
                 "",
@@ -321,7 +321,7 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String>
             format!("Use {what}: it saves time as well.")
         }
         (Some(ns), _) => {
-            // Within noise of saving time as well.
+            // The interval includes saving time as well.
             let most = ns.upper.filter(|_| ns.lower == Some(0.0));
             let within = most.map_or_else(String::new, |most| format!(" (0 to {})", time(most)));
             let least = time(ns.value);
@@ -330,7 +330,7 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String>
     })
 }
 
-/// Samples that the stencil-test saves against the default test.
+/// Sentence on the samples that the stencil test saves over the default test.
 fn of_stencil(report: &FunnelReport) -> Option<String> {
     let test = |name: &str| {
         let row = report.stages.iter().find(|row| row.back_end.name == name)?;
@@ -404,13 +404,13 @@ mod tests {
             of_gain(&gain(350.0, 300.0, 734.0), &[own], false).expect("one"),
             "region (portals) removes 6.00 items per view, 5.00 of them visible."
         );
-        // The loss of another stage is not its own.
+        // Losses of another stage are not attributed to this one.
         let other = lossy(StageKind::Occlusion, 5.0);
         let own = of_gain(&gain(350.0, 300.0, 734.0), &[other], false);
         assert_eq!(own.expect("one"), format!("{wanted}."));
         assert!(advice(0.0, 0.0, 9.0).ends_with("more than 0 ns (0 to 9.00 ns)."));
         assert!(advice(0.0, 0.0, 0.0).ends_with("saves time as well."));
-        // What is not found to be hidden is not "not needed".
+        // Items that may still be hidden: the stage must not be called "not needed".
         let named = |stage| Gain::new(stage, ("masked", "items"), [3.0; 2], [vec![], vec![]]);
         let row = |truth_count| {
             let mut row = lossy(StageKind::Occlusion, 0.0);

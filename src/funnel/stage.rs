@@ -1,4 +1,4 @@
-//! Stages of the funnel in their order, their back ends, and chains of these.
+//! Stages of the funnel in order, their back ends, and chains of these.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,12 +15,12 @@ use crate::visibility::triangle::TRIANGLE_ROWS;
 use crate::visibility::{Guarantee, Row, SampleGrid, region};
 
 named! {
-    /// A stage that takes candidates and returns fewer of them.
+    /// A stage that receives candidates and returns fewer of them.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
     #[derive(Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum StageKind {
-        /// Rooms that can be seen into, and so items.
+        /// Rooms that may be visible, and so their items.
         #[default]
         Region = "region",
         /// Items that the frustum meets.
@@ -35,11 +35,11 @@ named! {
 }
 
 impl StageKind {
-    /// The stages that return whole items, which are then drawn.
+    /// Stages that return whole items; their result is drawn.
     pub const OF_ITEMS: [StageKind; 3] =
         [StageKind::Region, StageKind::Object, StageKind::Occlusion];
 
-    /// Unit of the counts at the exit of the stage.
+    /// Unit of the counts after the stage.
     pub fn unit(self) -> &'static str {
         match self {
             StageKind::Triangle => "triangles",
@@ -48,26 +48,26 @@ impl StageKind {
     }
 }
 
-/// Name of the row of every stage that removes nothing.
+/// Name of each stage's row that removes nothing.
 pub const NONE: &str = "none";
 
-/// A way to do a stage.
+/// A back end of a stage.
 #[derive(Clone, Copy, PartialEq, Default, Debug, Serialize)]
 pub struct BackEnd {
-    /// The stage that it does.
+    /// Stage that it implements.
     pub stage: StageKind,
     /// Name on the command line.
     pub name: &'static str,
-    /// One line about it.
+    /// One-line description.
     pub summary: &'static str,
     /// Declared guarantee of its answers.
     pub guarantee: Guarantee,
-    /// `true` if it does the object stage as well, in one traversal.
+    /// `true` if it includes the object stage, in one traversal.
     pub does_object_stage: bool,
 }
 
 impl BackEnd {
-    /// A back end of a stage; of the occlusion stage, one with a tree of its own.
+    /// Creates a back end; in the occlusion stage, one with a tree of its own.
     pub fn new(
         stage: StageKind,
         [name, summary]: [&'static str; 2],
@@ -82,7 +82,7 @@ impl BackEnd {
         }
     }
 
-    /// The back end of a row of the stage's table.
+    /// Back end for a row of the stage's table.
     pub fn of<B>(stage: StageKind, row: &Row<B>) -> BackEnd {
         BackEnd::new(stage, [row.name, row.summary], row.guarantee)
     }
@@ -91,23 +91,23 @@ impl BackEnd {
 /// A stage of whole items and the name of its back end.
 pub type Step = (StageKind, String);
 
-/// A back end for each stage, by name.
+/// Choice of a back end for each stage, by name.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Chain {
     names: [String; StageKind::ALL.len()],
 }
 
 impl Chain {
-    /// The chain that leaves out every stage.
+    /// Chain that leaves out every stage.
     pub fn empty() -> Chain {
         Chain {
             names: StageKind::ALL.map(|_| NONE.to_owned()),
         }
     }
 
-    /// Default chain of a scene, with the first structure for its object stage.
+    /// Default chain of a scene, with the first structure for the object stage.
     ///
-    /// It has the safe back end of every other stage that removes the most.
+    /// Each other stage has its safe back end that removes the most.
     pub fn for_scene(scene: &Scene, structures: &[StructureSpec], has_cut_outs: bool) -> Chain {
         let object = structures.first().map_or(NONE, |spec| &spec.label);
         let chain = Chain::empty().with(StageKind::Object, object);
@@ -125,25 +125,25 @@ impl Chain {
         known.fold(chain, |chain, (stage, name)| chain.with(stage, name))
     }
 
-    /// Name of the back end of a stage.
+    /// Name of a stage's back end.
     pub fn of(&self, stage: StageKind) -> &str {
         &self.names[stage as usize]
     }
 
-    /// The same chain with another back end in one stage.
+    /// Replaces the back end of one stage.
     pub fn with(mut self, stage: StageKind, name: &str) -> Chain {
         name.clone_into(&mut self.names[stage as usize]);
         self
     }
 
-    /// The stages of whole items before `end` that the chain does not leave out.
+    /// Stages of whole items before `end` that the chain does not leave out.
     pub fn steps_before(&self, end: StageKind) -> Vec<Step> {
         let stages = StageKind::OF_ITEMS.into_iter().filter(|stage| *stage < end);
         let steps = stages.map(|stage| (stage, self.of(stage).to_owned()));
         steps.filter(|(_, name)| name != NONE).collect()
     }
 
-    /// The stages of whole items up to one that another back end does.
+    /// Stages of whole items up to `stage`, which uses the back end `name`.
     pub fn steps_with(&self, stage: StageKind, name: &str) -> Vec<Step> {
         let mut steps = self.steps_before(stage);
         if name != NONE {
@@ -154,7 +154,7 @@ impl Chain {
 
     /// Returns `true` if a stage is timed by itself.
     ///
-    /// The object stage is not where the occlusion stage does both.
+    /// False for the object stage if the occlusion stage includes it.
     pub fn is_separate(&self, stage: StageKind) -> bool {
         stage != StageKind::Object || self.of(StageKind::Occlusion) == NONE
     }
@@ -165,23 +165,24 @@ impl Chain {
     }
 }
 
-/// The search of the region stage.
+/// Portal search of the region stage.
 pub const PORTAL_RECT: &str = "portal-rect";
 const MASKED_INNER: &str = "masked-inner";
-/// The test that takes every item for solid.
+/// Depth test that treats every item as solid.
 pub const Z: &str = "z-test";
 const ALPHA: &str = "alpha-test";
-/// The test that is restricted to the samples of portals.
+/// Depth test restricted to the samples of portals.
 pub const STENCIL: &str = "stencil-test";
-/// Tests that not every scene has, and what they need.
+/// Tests that not every scene has, with their requirements.
 pub const NEEDS: [[&str; 2]; 2] = [
     [ALPHA, "--cut-out as well"],
     [STENCIL, "a scene of rooms with portals"],
 ];
 
-/// The region stage as left out, if the sectors of a map do not divide the plane.
+/// Region stage, table or back end that a map cannot have, with the reason.
 ///
-/// Else the map's REJECT table, if it is too short, or a table that a map lacks.
+/// The whole stage if the sectors do not divide the plane; else the REJECT table if it is too
+/// short, or the visibility table if the map has none.
 pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     let map = match &scene.regions {
         Regions::Bsp(map) => map,
@@ -203,9 +204,9 @@ pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     is_short.then(|| LeftOutRow::new("stages", "reject", reason))
 }
 
-/// Back ends of a stage that a scene can have, without structures.
+/// Back ends that a scene can have in a stage, without structures.
 ///
-/// With `has_cut_outs` some items have holes.
+/// `has_cut_outs` is true if some items have holes.
 pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
     let declared = [NONE, "the stage is left out"];
     let mut rows = vec![BackEnd::new(stage, declared, Guarantee::Conservative)];
@@ -232,7 +233,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
 
 /// Tests of the fragment stage.
 ///
-/// Each tells whether a scene has what it needs; with `true` some items have holes.
+/// `build` tests whether a scene has what the row needs; its flag is true if some items have holes.
 const FRAGMENT_ROWS: &[FragmentRow] = rows! { FragmentRow { name, guarantee, summary, build }
     Z, Guarantee::SampleExact, "the nearest fragment of each sample, exactly",
         |_, has_cut_outs| !has_cut_outs;
@@ -253,7 +254,7 @@ pub fn default_test(has_cut_outs: bool) -> &'static str {
 /// Appends the items of a view that are not hidden.
 pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
 
-/// A row of the occlusion stage: allocates a buffer of the given size.
+/// Row of the occlusion stage: allocates a buffer of the given size.
 pub type OcclusionRow = Row<fn(SampleGrid, Kernel) -> Occlude>;
 
 /// Rows of the occlusion stage.

@@ -1,4 +1,4 @@
-//! The study: every stage with every back end on the views of a path.
+//! Funnel study: every back end of every stage on the views of a path.
 //!
 //! All are compared with the truth, then timed side by side in one or more processes.
 
@@ -24,12 +24,12 @@ use crate::visibility::{Level, SampleGrid};
 /// Measured: 230 for meshes, 290 to 350 for boxes, and 660 without culling.
 const BYTES_PER_SAMPLE: u64 = 450;
 
-/// Bytes per solid box that the chain leaves of a view; 1,480 were measured.
+/// Bytes per solid box that the chain leaves in a view; 1,480 were measured.
 ///
-/// Its triangles with all their back ends, orders and fragments.
+/// Includes its triangles with all their back ends, orders and fragments.
 const BYTES_PER_LEFT: f64 = 1600.0;
 
-/// Refuses images that need more memory than is available.
+/// Rejects images that need more memory than is available.
 fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
     let SampleGrid { width, height } = grid;
     let needed = u64::from(width) * u64::from(height) * BYTES_PER_SAMPLE;
@@ -37,7 +37,7 @@ fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
     fits_into(available, [&images, "", "fewer samples"], needed)
 }
 
-/// Everything that is timed, on the items that the chain leaves.
+/// All timed work, on the items that the chain leaves.
 struct Study<'w> {
     chain: &'w Chain,
     items: ItemStages<'w>,
@@ -66,7 +66,7 @@ impl<'w> Study<'w> {
         })
     }
 
-    /// Everything that is timed.
+    /// All timed tasks.
     fn tasks(&self) -> Vec<KeyedTask<'_>> {
         let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
         tasks.extend(self.triangles.tasks());
@@ -95,7 +95,7 @@ impl<'w> Study<'w> {
         rows
     }
 
-    /// The chain without each of its stages, from the rows of all stages.
+    /// Compares the chain with itself minus each stage, from the rows of all stages.
     fn gains(&self, rows: &[StageRow]) -> Vec<Gain> {
         let timed = self.items.timed(self.chain);
         let of_items = StageKind::OF_ITEMS.into_iter();
@@ -110,7 +110,7 @@ impl<'w> Study<'w> {
             if self.chain.is_separate(stage) {
                 return Some(gain(self.chain, stage));
             }
-            // A traversal that does it as well, and is worth nothing.
+            // The occlusion stage includes the object stage, but removes nothing.
             let is_vain = gain(self.chain, StageKind::Occlusion).removed() == 0.0;
             let alone = self.chain.clone().with(StageKind::Occlusion, NONE);
             is_vain.then(|| gain(&alone, stage))
@@ -128,8 +128,9 @@ impl<'w> Study<'w> {
         of_items.chain(behind).collect()
     }
 
-    /// Unit and counts with and without a stage behind those of whole items. Without a
-    /// test every fragment of the remaining items is shaded.
+    /// Unit and counts, with and without a stage that follows the item stages.
+    ///
+    /// Without a fragment test every fragment of the remaining items is shaded.
     fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
         let default = default_test(self.items.world.cut_outs.is_some());
         let every = rows.iter().find(|row| row.back_end.name == default);
@@ -140,18 +141,19 @@ impl<'w> Study<'w> {
     }
 }
 
-/// A compared study before its times.
+/// A study that is compared with the truth, but not timed.
 pub struct Prepared {
     /// Tasks and schedule for all processes.
     pub plan: FunnelPlan,
     report: FunnelReport,
 }
 
-/// Compares all back ends with the truth and plans their times.
+/// Compares all back ends with the truth and plans their timing.
+///
 /// `begin` gets the name of each step before it starts.
 ///
 /// # Errors
-/// A camera, a structure, a back end or an image that is refused.
+/// A camera, a structure, a back end or an image that is rejected.
 pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     let Setting { scene, path, .. } = input.setting;
     fits(input.samples, available_bytes())?;
@@ -222,7 +224,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
     })
 }
 
-/// Times of one process.
+/// Times the plan in one process.
 ///
 /// # Errors
 /// The errors of [`prepare`].
@@ -233,7 +235,7 @@ pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes> {
 }
 
 impl Prepared {
-    /// The funnel with the times of all processes.
+    /// Builds the report from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> FunnelReport {
         let times = self.plan.times(processes);
         let mut report = self.report;
@@ -251,7 +253,7 @@ impl Prepared {
     }
 }
 
-/// The first reason for which a task has no time, if one failed.
+/// Reason of the first task without a time, if any.
 pub fn failure(processes: &[ProcessTimes]) -> Option<&Verdict> {
     let results = processes.iter().flat_map(|process| &process.ln_ns);
     results.filter_map(|result| result.as_ref().err()).next()

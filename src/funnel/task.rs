@@ -9,18 +9,18 @@ use super::world::FunnelInput;
 use crate::measure::{Ask, ProcessTimes, StudyPlan, TimedTask};
 
 named! {
-    /// A question about a cursor.
+    /// A picking query at a cursor.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
     #[derive(Debug, Serialize, Deserialize)]
     pub enum PickQuestion {
-        /// The first item along the ray.
+        /// First item along the ray.
         #[default]
         #[serde(rename = "first item")]
         First = "first item",
-        /// The nearest few along the ray, and all that are as near as the last of them.
+        /// Nearest few items along the ray, with all at the depth of the last of them.
         #[serde(rename = "nearest 8")]
         Nearest = "nearest 8",
-        /// Every item in the frustum of a small rectangle about the cursor.
+        /// All items in the frustum of a small rectangle around the cursor.
         #[serde(rename = "all within 4 pixels")]
         Through = "all within 4 pixels",
     }
@@ -29,22 +29,22 @@ named! {
 /// Identity of a timed task, the same in every process.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub enum FunnelKey {
-    /// The last of some stages of whole items, on the items that the others leave.
+    /// The last of some item stages, applied to the output of the others.
     Steps(Vec<Step>),
-    /// A back end of the triangle or fragment stage, behind the chain's item stages.
+    /// Back end of the triangle or fragment stage, after the chain's item stages.
     Stage(StageKind, String),
-    /// A back end of picking.
+    /// Back end of picking.
     Pick(PickQuestion, String),
 }
 
-/// A task of the timed pass; the number of ids that it appends is checked.
+/// Task of the timed pass; the number of ids that it appends is checked.
 pub type KeyedTask<'w> = (FunnelKey, Ask<'w>);
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 pub type FunnelPlan = StudyPlan<FunnelKey>;
 
 impl FunnelPlan {
-    /// Does every task once in each of `views` views, and plans their times.
+    /// Runs every task once in each of `views` views and plans the timing.
     pub fn of(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
         let mut out = Vec::new();
         let mut count = |ask: &Ask, view| {
@@ -59,7 +59,7 @@ impl FunnelPlan {
         StudyPlan::new(tasks.collect(), views, &input.setting.protocol)
     }
 
-    /// Times of one process.
+    /// Times the plan in one process.
     ///
     /// A planned task that this process does not have fails by its counts.
     pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {

@@ -1,7 +1,7 @@
 //! Triangle stage: clusters of triangles of the items that the chain leaves.
 //!
-//! Clusters of solid boxes are built for each view; those of a mesh or a map once, without
-//! its floors and ceilings, and a back end skips those of other items.
+//! Clusters of solid boxes are built for each view; those of a mesh or a map once, without its
+//! floors and ceilings, and a back end skips those of other items.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -21,15 +21,15 @@ use crate::visibility::triangle::{
     Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, TriangleRow, facing,
 };
 
-/// Bytes per triangle of a mesh beside its scene; 310 were measured.
+/// Bytes per triangle of a mesh in addition to its scene; 310 were measured.
 ///
-/// Trees for rays, clusters and every back end of both.
+/// Includes trees for rays, clusters and every back end of both.
 pub const BYTES_PER_TRIANGLE: u64 = 350;
 
 /// Origin of a view's triangles.
 ///
-/// Faces of boxes are rounded about the eye, so that none changes its side; where f32 does
-/// not reach from there, about the scene's own origin.
+/// Faces of boxes are rounded relative to the eye, so that none changes its side; if f32 does not
+/// reach that far, relative to the scene's origin.
 fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     let eye = camera.frame.eye;
     let reach = scene.bounds.reach().as_dvec3() + (eye - scene.origin).abs();
@@ -69,16 +69,16 @@ struct Faces {
     truth: Selection,
 }
 
-/// Triangles of the items that the chain leaves, in every view.
+/// Triangles of the remaining items in every view.
 pub struct TriangleStage {
     views: Vec<Faces>,
     kernel: Kernel,
 }
 
 impl TriangleStage {
-    /// Clusters of the remaining items.
+    /// Builds clusters of the remaining items.
     ///
-    /// A box takes 12 triangles, which is much memory where a stage before is left out.
+    /// A box has 12 triangles, which takes much memory if an earlier stage is left out.
     pub fn new(stages: &ItemStages) -> TriangleStage {
         let world = stages.world;
         let whole = match &world.shape {
@@ -111,7 +111,7 @@ impl TriangleStage {
         }
     }
 
-    /// Triangles that a back end leaves; all of them by none.
+    /// Triangles that a back end leaves; all of them for `none`.
     fn kept(&self, name: &str, view: usize) -> Selection {
         let faces = &self.views[view];
         let mut kept = faces.given.clone();
@@ -122,7 +122,7 @@ impl TriangleStage {
         kept
     }
 
-    /// Every back end; the ids are of clusters with a triangle left.
+    /// Tasks of all back ends; the ids are of clusters with a triangle left.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         let built = self.views.first().map(|faces| &faces.built.culls);
         built.into_iter().flatten().map(move |(name, _)| {
@@ -137,7 +137,7 @@ impl TriangleStage {
         })
     }
 
-    /// Triangles of a view that a back end leaves, by their index among the surfaces.
+    /// Indices of the triangles that a back end leaves in a view, among the surfaces.
     pub fn triangles(&self, name: &str, view: usize) -> Vec<u32> {
         let kept = self.kept(name, view);
         let clusters = &self.views[view].built.clusters;
@@ -149,7 +149,7 @@ impl TriangleStage {
         triangles
     }
 
-    /// Counts of a back end in every view, against the exact side of each triangle.
+    /// Counts of a back end in each view, compared with the exact facing test.
     pub fn counts(&self, name: &str) -> Vec<ViewCounts> {
         let count = |(view, faces): (usize, &Faces)| {
             let (kept, right) = (self.kept(name, view), &faces.truth);
@@ -175,7 +175,7 @@ mod tests {
     use crate::visibility::Guarantee;
     use crate::visibility::triangle::TRIANGLE_ROWS;
 
-    /// Triangles on the sides of a box with an area that face an eye, two per side.
+    /// Number of triangles of a box that face an eye, two per side with an area.
     fn seen(b: &WorldBox, eye: DVec3) -> usize {
         let sides = (0..3).filter(|&axis| (0..3).all(|k| k == axis || b.min[k] < b.max[k]));
         let of_axis = |axis: usize| {
@@ -184,7 +184,7 @@ mod tests {
         2 * sides.map(of_axis).sum::<usize>()
     }
 
-    /// However coarse f32 is about the scene's origin.
+    /// Holds however coarse f32 is about the scene's origin.
     #[test]
     fn triangles_face_the_eye_where_faces_of_the_written_boxes_do() {
         let mut rng = SeededRng::new(6);
@@ -197,7 +197,7 @@ mod tests {
                     let at = eye + rng.normal3() * [1e-7, 1.0, 30.0][n % 3];
                     let thin = [(); 3].map(|()| rng.below(3) as f64 / 2.0);
                     let size = rng.point() * DVec3::from(thin) * 3.0;
-                    // Some faces are in the plane of the eye.
+                    // The eye is in the plane of some faces.
                     let at = if n == 3 { at.with_y(eye.y) } else { at };
                     WorldBox::new(at, at + size)
                 })

@@ -1,6 +1,6 @@
-//! Exactly visible items of each view, and counts of a stage against them.
+//! Exactly visible items of each view, and a stage's counts against them.
 //!
-//! Solid boxes are boxes to rays, meshes and maps are triangles.
+//! Rays meet solid boxes in box scenes, triangles in meshes and maps.
 
 use anyhow::anyhow;
 use serde::Serialize;
@@ -12,13 +12,13 @@ use crate::statistics::{Estimate, rate_of};
 use crate::visibility::truth::{RayIndex, SampleTruth, SolidBox, SurfaceIndex};
 use crate::visibility::{Rays, SampleGrid, fragment};
 
-/// Samples that estimate how many surfaces are tested at all samples.
+/// Coarse grid that estimates the number of body tests at all samples.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
 
-/// Tests of items by rays that take as long as a front item.
+/// Number of body tests that take about as long as one front item.
 const TESTS_PER_ITEM: u64 = 16;
 
-/// Visible items of each view with the samples of each, ascending.
+/// Visible items of each view by ascending id, with their numbers of samples.
 pub type Truth = Vec<Vec<(ItemId, u32)>>;
 
 /// Visible items at the samples of every view.
@@ -36,14 +36,14 @@ pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
         let truth = truth.map_err(|error| anyhow!("camera {camera}: {error}"))?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
-        // Floors and ceilings of a map come behind its items.
+        // Floors and ceilings of a map follow its items.
         seen.retain(|(item, _)| *item < items);
         Ok(seen)
     };
     world.views().map(of_view).collect()
 }
 
-/// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.
+/// Surfaces that stop rays: solid boxes, or triangles with the floors of a map.
 pub enum RaysEnd<'w> {
     Boxes(RayIndex, Option<&'w fragment::Holes>),
     Triangles(SurfaceIndex),
@@ -100,22 +100,22 @@ impl RaysEnd<'_> {
     }
 }
 
-/// One view of one stage.
+/// Counts of one stage in one view.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct ViewCounts {
-    /// Candidates.
+    /// Number of candidates.
     pub input: u64,
-    /// Returned candidates.
+    /// Number of returned candidates.
     pub output: u64,
-    /// Visible candidates.
+    /// Number of visible candidates.
     pub truth: u64,
     /// Visible candidates that are not returned.
     pub false_negatives: u64,
-    /// Samples whose front item is one of them.
+    /// Samples with a false negative in front, summed over the false negatives.
     pub missing_samples: u64,
-    /// The most of them of one item.
+    /// Most such samples of a single item.
     pub worst_missing_samples: u64,
-    /// Samples with an item in front.
+    /// Samples with an item in front, summed over the visible items.
     pub samples: u64,
 }
 
@@ -125,15 +125,15 @@ impl ViewCounts {
         self.input - self.truth
     }
 
-    /// Returned, though not visible.
+    /// Returned candidates that are not visible.
     pub fn false_positives(&self) -> u64 {
         self.output + self.false_negatives - self.truth
     }
 }
 
-/// Counts of a stage that got `input` (`None`: `all` items) and returned `output`.
+/// Counts of a stage with the given input (`None`: all `all` items) and output.
 ///
-/// `visible` are the visible items with the samples of each. All lists are ascending.
+/// `visible` are the visible items, each with its number of samples. All lists are ascending.
 pub fn count_items(
     input: Option<&[ItemId]>,
     all: usize,
@@ -152,7 +152,7 @@ pub fn count_items(
     for &(item, samples) in visible {
         let samples = u64::from(samples);
         counts.samples += samples;
-        // A loss counts at the stage that drops the item, not at those behind it.
+        // A loss counts at the stage that drops the item, not at later ones.
         if is_given(&item) && output.binary_search(&item).is_err() {
             counts.false_negatives += 1;
             counts.missing_samples += samples;
@@ -162,16 +162,16 @@ pub fn count_items(
     counts
 }
 
-/// Errors of a stage over all views. Counts are means per view.
+/// Errors of a stage over all views; counts are means per view.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct Errors {
     /// Candidates: items or triangles.
     pub input_count: f64,
     /// Returned candidates.
     pub output_count: f64,
-    /// Visible ones among them.
+    /// Visible candidates.
     pub truth_count: f64,
-    /// Returned, though not visible.
+    /// Returned candidates that are not visible.
     pub false_positive_count: f64,
     /// Visible candidates that are not returned.
     pub false_negative_count: f64,
@@ -181,16 +181,16 @@ pub struct Errors {
     pub missing: Option<Estimate>,
     /// Share of the samples whose front item the stage drops, by view.
     pub image_error: Option<Estimate>,
-    /// Most samples that one missing item is in front at.
+    /// Most samples at which a single missing item is in front.
     pub worst_missing_samples: u64,
     /// Longest run of consecutive views that each lack a visible item.
     pub longest_missing_streak: usize,
-    /// Share of the candidates that are not visible that the stage removed.
+    /// Share of the invisible candidates that the stage removed.
     pub removed_share: Option<Estimate>,
 }
 
 impl Errors {
-    /// Errors over the views of a path, in its order.
+    /// Errors over the views of a path, in path order.
     pub fn of(views: &[ViewCounts]) -> Errors {
         let mean = |of: fn(&ViewCounts) -> u64| {
             views.iter().map(|view| of(view) as f64).sum::<f64>() / views.len().max(1) as f64
@@ -228,7 +228,7 @@ mod tests {
             (1, 1)
         );
         assert_eq!((counts.samples, counts.truth), (15, 3));
-        // The loss of a stage before is not counted again.
+        // A loss at an earlier stage is not counted again.
         let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 9], &visible);
         assert_eq!((counts.input, counts.hidden(), counts.truth), (5, 3, 2));
         assert_eq!((counts.false_positives(), counts.false_negatives), (1, 0));

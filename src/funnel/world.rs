@@ -25,15 +25,15 @@ use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{Pvs, RegionGraph, RegionItems};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, surfaces_of};
 
-/// Bytes per item of structure, solids, occluders and trees for rays.
+/// Bytes per item: structure, solids, occluders and trees for rays.
 ///
-/// 730 were measured of boxes with one structure.
+/// 730 were measured for boxes with one structure.
 const BYTES_PER_ITEM: u64 = 750;
 
-/// Bytes per pair of regions of a table, which may be of all, with its list.
+/// Bytes per pair of regions in a table and its list; all pairs may be stored.
 const BYTES_PER_PAIR: u64 = 8;
 
-/// Most that f32 may move corners without a warning, of an item's longest edge.
+/// Largest displacement by f32 without a warning, relative to the longest edge.
 const MOST_MOVED: f64 = 1.0 / 64.0;
 
 /// Scene, path and options of a study.
@@ -43,28 +43,28 @@ pub struct FunnelInput<'a> {
     pub setting: &'a Setting,
     /// Most views, evenly spread over the path.
     pub most_views: usize,
-    /// Samples of a view that decide which items are visible.
+    /// Samples of a view, which decide which items are visible.
     pub samples: SampleGrid,
     /// Items that have holes.
     pub cut_outs: Option<&'a CutOuts>,
     /// Back end of each stage.
     pub chain: Chain,
-    /// Structures for the object stage; one of them is the chain's.
+    /// Structures for the object stage; the chain uses one of them.
     pub structures: &'a [StructureSpec],
     /// Most boxes inside each item of a mesh, at least 1; `None` for [`BOXES`].
     pub inner_boxes: Option<usize>,
-    /// How the scene was read: so are the other levels of its file.
+    /// How the scene was loaded; the other levels of its file are loaded alike.
     pub loading: LoadOptions,
     /// Instruction set of every stage, and threads that compute the truth.
     pub execution: Execution,
-    /// Every back end of every stage beside the chain.
+    /// Measures every back end of every stage in addition to the chain.
     pub all: bool,
-    /// Picking, if `all`.
+    /// Measures picking, if `all` is set.
     pub picks: bool,
 }
 
 impl<'a> FunnelInput<'a> {
-    /// Everything about a chain, on `most_views` views at most.
+    /// Input with all defaults for a chain, on at most `most_views` views.
     pub fn new(
         setting: &'a Setting,
         chain: Chain,
@@ -87,16 +87,16 @@ impl<'a> FunnelInput<'a> {
     }
 }
 
-/// Items as rays meet them.
+/// Geometry of the items as rays meet them.
 pub enum Shape {
     /// Solid boxes.
     Boxes(Solids),
-    /// Triangles of a mesh; or of a map, with its floors and ceilings behind the items.
+    /// Triangles of a mesh, or of a map with floors and ceilings after the items.
     Triangles(Arc<Surfaces>),
 }
 
 impl Shape {
-    /// Shape of the items of a scene.
+    /// Geometry of the items of a scene.
     pub fn of(scene: &Scene) -> Shape {
         match surfaces_of(scene) {
             None => Shape::Boxes(Solids::of(scene)),
@@ -104,7 +104,7 @@ impl Shape {
         }
     }
 
-    /// Solid boxes, if the items are some.
+    /// Solid boxes, if the items are solid boxes.
     pub fn boxes(&self) -> Option<&Solids> {
         match self {
             Shape::Boxes(solids) => Some(solids),
@@ -128,14 +128,14 @@ pub struct World<'a> {
     pub samples: SampleGrid,
     pub views: Vec<View>,
     pub shape: Shape,
-    /// Items that have holes, if any have.
+    /// Items that have holes, if any.
     pub cut_outs: Option<fragment::Holes>,
-    /// Occluders.
+    /// Occluders of the scene.
     pub hiders: Hiders,
     pub regions: Option<Regions>,
-    /// Structures of the object stage under their labels.
+    /// Structures of the object stage with their specs.
     pub structures: Vec<(&'a StructureSpec, Box<dyn DynIndex>)>,
-    /// The chain whose back ends are the only ones; `None` for all.
+    /// Chain whose back ends are the only ones; `None` for all.
     only: Option<Chain>,
 }
 
@@ -143,8 +143,8 @@ impl<'a> World<'a> {
     /// Builds structures, regions and occluders; `begin` gets the name of each step.
     ///
     /// # Errors
-    /// Options that do not fit the scene, a camera without frustum or rays, a structure
-    /// that refuses the scene.
+    /// Options that do not fit the scene, a camera without frustum or rays, a structure that
+    /// rejects the scene.
     pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<World<'a>> {
         check_options(input)?;
         let scene = &input.setting.scene;
@@ -163,11 +163,11 @@ impl<'a> World<'a> {
         let structures = built.collect::<Result<_, _>>()?;
         let mut cut_outs = None;
         if let (Some(typed), Shape::Boxes(solids)) = (input.cut_outs, &mut shape) {
-            // A view into the next room leads through portals only: walls have no holes.
+            // The next room is visible through portals only, so walls have no holes.
             let walls = regions.as_ref().map(|regions| regions.graph.borders(scene));
             let is_free = |item| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
             let holes = typed.holes(scene.items.len(), is_free);
-            // What has holes may be hidden and hides nothing.
+            // An item with holes may be hidden but hides nothing.
             let all = solids.inner.iter_mut().zip(&holes.of_item);
             for (inner, _) in all.filter(|(_, hole)| hole.is_some()) {
                 *inner = Aabb::EMPTY;
@@ -204,7 +204,7 @@ impl<'a> World<'a> {
         self.scene.items.len()
     }
 
-    /// Ids of a set; `None` is all items.
+    /// Ids of a set; `None` means all items.
     pub fn listed<'i>(&self, items: Option<&'i [ItemId]>) -> Cow<'i, [ItemId]> {
         match items {
             Some(items) => items.into(),
@@ -212,7 +212,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Occluders of a view.
+    /// Occluders valid for a view.
     pub fn occluders(&self, view: usize) -> &OccluderScene {
         let rays = self.rays(view);
         let is_inside = || {
@@ -222,12 +222,12 @@ impl<'a> World<'a> {
         self.hiders.from_eye(self.hiders.is_open(rays, is_inside))
     }
 
-    /// A warning about items in view that f32 moves by much of their longest edge.
+    /// Warning about items in view that f32 moves by much of their longest edge.
     pub fn rounded(&self) -> Option<String> {
         let surfaces = self.scene.surfaces.as_ref()?;
         let share = |(item, b): (usize, WorldBox)| {
             let own = WorldBox::of(&surfaces.bounds(item), surfaces.origin);
-            // A box may be wider than its triangles, as that of a patch's control points is.
+            // A box may be wider than its triangles, like that of a patch's control points.
             let moved = (b.min - own.min).max(own.max - b.max);
             let share = moved.max_element() / (b.max - b.min).max_element();
             let is_seen = |view: &View| view.volume.sees(&self.scene.items[item]);
@@ -246,12 +246,12 @@ impl<'a> World<'a> {
         ))
     }
 
-    /// Back ends of a stage that the scene can have, without structures.
+    /// Back ends that the scene can have in a stage, without structures.
     pub fn back_ends(&self, stage: StageKind) -> Vec<BackEnd> {
         back_ends(stage, self.scene, self.cut_outs.is_some())
     }
 
-    /// Back ends of a stage that are compared, each with its name or its structure's.
+    /// Compared back ends of a stage, each with its own or its structure's name.
     pub fn rows(&self, stage: StageKind) -> Vec<(BackEnd, String)> {
         let labels = self.structures.iter().map(|(spec, _)| &spec.label);
         let mut rows = rows(self.back_ends(stage), self.regions.as_ref(), labels);
@@ -262,7 +262,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// Back ends of a stage that a scene has, with structures for the object stage.
+/// Back ends of a stage in a scene, with structures for the object stage.
 fn rows<'l>(
     back_ends: Vec<BackEnd>,
     regions: Option<&Regions>,
@@ -282,7 +282,7 @@ fn rows<'l>(
     there.chain(structures).collect()
 }
 
-/// Views of the path, evenly spread.
+/// Views evenly spread over the path.
 fn views(input: &FunnelInput) -> Result<Vec<View>> {
     let Setting { scene, path, .. } = input.setting;
     let (around, all) = (scene.surroundings(), &path.cameras);
@@ -292,7 +292,7 @@ fn views(input: &FunnelInput) -> Result<Vec<View>> {
             error: error.into(),
         };
         let rays = Rays::of(&all[index]).map_err(refused)?;
-        // Planes and rays of the same numbers, also where a matrix has others.
+        // Planes and rays come from the same numbers, also for a matrix camera.
         let volume = rays.camera.volume(&PlaneOptions::default(), &around);
         let volume = volume.map_err(refused)?;
         Ok(View {
@@ -304,7 +304,7 @@ fn views(input: &FunnelInput) -> Result<Vec<View>> {
     views.collect()
 }
 
-/// Refuses back ends of the item stages that the scene cannot have.
+/// Rejects back ends of the item stages that the scene cannot have.
 fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<()> {
     let scene = &input.setting.scene;
     for stage in StageKind::OF_ITEMS {
@@ -324,7 +324,7 @@ fn check_chain(input: &FunnelInput, regions: Option<&Regions>) -> Result<()> {
     Ok(())
 }
 
-/// Refuses options that the items of the scene cannot have.
+/// Rejects options that the items of the scene cannot have.
 fn check_options(input: &FunnelInput) -> Result<()> {
     let scene = &input.setting.scene;
     let (name, shape) = (&scene.name, scene.item_shape());
@@ -358,7 +358,7 @@ fn regions(input: &FunnelInput) -> Result<Option<Regions>> {
     Ok(Regions::of(scene, is_read))
 }
 
-/// Rooms of a scene, or sectors or clusters of its map.
+/// Regions of a scene: rooms, or the sectors or clusters of its map.
 pub struct Regions {
     /// Regions and the openings between them.
     pub graph: RegionGraph,
@@ -369,8 +369,9 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// Back ends of a scene; `None` without regions, and for a map whose linedefs
-    /// contradict each other.
+    /// Regions of a scene, with the items of each.
+    ///
+    /// `None` without regions, and for a map whose linedefs contradict each other.
     pub fn of(scene: &Scene, with_table: bool) -> Option<Regions> {
         let (graph, table) = match (DoomMap::of_scene(scene), &scene.regions) {
             (Some(map), _) => (
@@ -390,7 +391,7 @@ impl Regions {
         })
     }
 
-    /// The stored pairs that a back end reads, none for a search.
+    /// Stored pairs that a back end reads: `Some(None)` for a search.
     ///
     /// `None` if the map lacks them.
     pub fn pairs(&self, name: &str) -> Option<Option<&Pvs>> {
@@ -409,7 +410,7 @@ mod tests {
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
-    /// A structure that finds nothing, beside one that is right, behind a region stage.
+    /// Runs a structure that finds nothing, and a correct one, after a region stage.
     #[test]
     fn an_object_row_behind_a_region_stage_asks_its_structure() {
         const LINEAR: fn() -> StructureSpec = || StructureSpec::parse("linear").expect("linear");
