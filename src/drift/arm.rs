@@ -1,14 +1,14 @@
 //! Spring arms, and the six methods that step them.
 //!
-//! A camera on a spring behind a target that is known where frames end, and moves on a
-//! straight line in between.
+//! A camera on a spring follows a target that is known at frame ends and moves on a straight line
+//! in between.
 
 use crate::kernel::each;
 
 /// Position and velocity.
 pub type State = [f64; 2];
 
-/// `x'' = k d (1 + s d^2) - c x'` with the stretch `d = T - x` and a stop.
+/// Spring arm `x'' = k d (1 + s d^2) - c x'` with stretch `d = T - x`, and a stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Arm {
     /// k in 1/s^2.
@@ -17,14 +17,14 @@ pub struct Arm {
     pub friction: f64,
     /// s: 0 for a linear spring, 1 for Duffing's.
     pub stiffening: f64,
-    /// Position that the arm cannot pass; meeting it takes all velocity.
+    /// Position that the arm cannot pass; hitting it stops the arm.
     pub stop: f64,
 }
 
-/// The target during one frame, in seconds since the frame began.
+/// Target during one frame, as a function of the seconds since the frame began.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Line {
-    /// When the frame begins.
+    /// Start time of the frame.
     pub start: f64,
     pub base: f64,
     pub speed: f64,
@@ -37,16 +37,17 @@ impl Line {
     }
 }
 
-/// `exp(-zeta angle) (cosh r, sinh(r)/r)` with `r = angle sqrt(zeta^2 - 1)`.
+/// Computes `exp(-zeta angle) (cosh r, sinh(r)/r)`, `r = angle sqrt(zeta^2 - 1)`.
+///
 /// Below critical damping `r` is imaginary.
 ///
-/// The usual formulas subtract two decays and divide by their distance, which is zero at
-/// critical damping; beside it they have no digits left.
+/// The usual formulas subtract two decaying exponentials and divide by the difference of their
+/// rates, which is zero at critical damping; near it they have no digits left.
 fn damped_pair(zeta: f64, angle: f64) -> (f64, f64) {
     // (zeta - 1)(zeta + 1), since zeta^2 - 1 cancels.
     let excess = (zeta - 1.0) * (zeta + 1.0);
     let root = excess.abs().sqrt();
-    // At zero both sines are as good as their argument.
+    // Near zero both sines equal their argument.
     let r = (angle * root).max(1e-100);
     let fall = libm::exp(-zeta * angle);
     if excess < 0.0 {
@@ -54,15 +55,15 @@ fn damped_pair(zeta: f64, angle: f64) -> (f64, f64) {
     } else if r < 1.0 {
         (fall * libm::cosh(r), fall * libm::sinh(r) / r)
     } else {
-        // Two decays instead of exp times cosh, which overflows; the slow
-        // rate zeta - root without its cancellation.
+        // Two exponentials instead of exp times cosh, which overflows; the slow rate zeta - root
+        // without its cancellation.
         let slow = libm::exp(-angle / (zeta + root));
         let fast = libm::exp(-angle * (zeta + root));
         ((slow + fast) / 2.0, (slow - fast) / (2.0 * r))
     }
 }
 
-/// Position and velocity `h` seconds later, if the target rests at zero.
+/// Position and velocity after `h` seconds, for a target at rest at zero.
 fn released(stiffness: f64, zeta: f64, [x, v]: State, h: f64) -> State {
     let omega = stiffness.sqrt();
     let (cosh, sinhc) = damped_pair(zeta, omega * h);
@@ -73,8 +74,10 @@ fn released(stiffness: f64, zeta: f64, [x, v]: State, h: f64) -> State {
     ]
 }
 
-/// The arm `h` seconds after `t`. Behind a target of constant speed it stays
-/// `2 zeta/omega` seconds behind; how it differs from that is released.
+/// The arm `h` seconds after `t`.
+///
+/// Behind a target of constant speed it settles `2 zeta/omega` seconds behind; its deviation from
+/// that decays as for a target at rest.
 pub fn chased(arm: &Arm, line: &Line, t: f64, [x, v]: State, h: f64) -> State {
     let stretch = line.at(t) - x;
     let secant = arm.stiffness * (1.0 + arm.stiffening * stretch * stretch);
@@ -91,7 +94,7 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ArmKind {
-        /// A spring on a line behind `sin t`.
+        /// A linear spring behind the target `sin t`.
         Linear = "linear",
         /// A spring that stiffens as it is stretched, and a stop at 0.6.
         ///
@@ -100,7 +103,7 @@ named! {
     }
 }
 
-/// An arm behind a target that is seen in frames of equal length.
+/// An arm behind a target that is known at frames of equal length.
 pub struct Chase {
     pub arm: Arm,
     pub start: State,
@@ -110,7 +113,7 @@ pub struct Chase {
 }
 
 impl Chase {
-    /// A critically damped arm behind `sin t`, in frames until `seconds` are over.
+    /// A critically damped arm behind `sin t`, for `seconds` in frames at `rate_hz`.
     pub fn new(kind: ArmKind, stiffness: f64, rate_hz: f64, seconds: f64) -> Chase {
         let (stiffening, stop, from) = match kind {
             ArmKind::Linear => (0.0, f64::INFINITY, 1.0),
@@ -136,8 +139,9 @@ impl Chase {
         }
     }
 
-    /// Steps through all frames, `count` equal steps each, and passes the state at the
-    /// end of each frame to `keep`.
+    /// Steps through all frames with `count` equal steps each.
+    ///
+    /// Passes the state at the end of each frame to `keep`.
     pub fn follow(&self, step: Step, count: u32, mut keep: impl FnMut(State)) {
         let h = self.frame_s / f64::from(count);
         let mut y = self.start;
@@ -152,7 +156,7 @@ impl Chase {
         }
     }
 
-    /// The states at the ends of all frames.
+    /// States at the ends of all frames.
     pub fn states(&self, step: Step, count: u32) -> Vec<State> {
         let mut states = Vec::with_capacity(self.frames.len());
         self.follow(step, count, |y| states.push(y));
@@ -160,19 +164,19 @@ impl Chase {
     }
 }
 
-/// The state `h` seconds after `t`.
+/// State `h` seconds after `t`.
 pub type Step = fn(&Arm, &Line, f64, State, f64) -> State;
 
-/// A method of the study.
+/// An integration method of the study.
 #[derive(Debug, serde::Serialize)]
 pub struct Method {
     /// Name in tables and JSON.
     pub name: &'static str,
-    /// One line about what it does.
+    /// One-line description.
     pub summary: &'static str,
     /// Classical order of the error, for steps far below 1/omega.
     ///
-    /// The order of the closed form on the collision arm comes from its frozen stretch.
+    /// On the collision arm the closed form has its order because it freezes the stretch.
     pub order: u32,
     #[serde(skip)]
     pub(super) step: Step,
@@ -206,7 +210,7 @@ pub fn rk4_of_sine(arm: &Arm, line: &Line, t: f64, y: State, h: f64) -> State {
     arm.rk4(|t| libm::sin(line.start + t), t, y, h)
 }
 
-/// `y + h slope`.
+/// Computes `y + h slope`.
 #[inline(always)]
 fn along(y: State, h: f64, slope: State) -> State {
     [y[0] + h * slope[0], y[1] + h * slope[1]]
@@ -214,11 +218,11 @@ fn along(y: State, h: f64, slope: State) -> State {
 
 /// Most iterations of a stage: one that needs more has no solution nearby.
 const MOST_ITERATIONS: u32 = 20;
-/// A change that is not worth another iteration.
+/// Change below which the iteration stops.
 const NEGLIGIBLE: f64 = 1e-14;
 
 impl Arm {
-    /// `y'` for a target there.
+    /// Derivative `y'` for a target position.
     #[inline(always)]
     fn slope(&self, target: f64, [x, v]: State) -> State {
         let stretch = target - x;
@@ -265,8 +269,9 @@ mod tests {
     use super::*;
     use crate::arithmetic::Expansion;
 
-    /// The series of the matrix exponential in 200 bits: no case distinction,
-    /// no square root of anything but k.
+    /// Reference: power series of the matrix exponential in 200 bits.
+    ///
+    /// No case distinction, and no square root except that of k.
     fn by_series(k: f64, zeta: f64, [x, v]: State, t: f64) -> State {
         let [k, zeta, t] = [k, zeta, t].map(Expansion::from);
         let omega = k.sqrt(5);
@@ -302,9 +307,9 @@ mod tests {
         assert!(released(1e6, 2.0, [1.0, -3.0], 20.0)[0].abs() < 1e-300);
     }
 
-    /// The states of a linear arm behind `sin t` itself at the ends of all frames.
+    /// States of a linear arm behind `sin t` itself at the ends of all frames.
     ///
-    /// It swings by `a sin t + b cos t`, and how its start differs from that is released.
+    /// The arm oscillates as `a sin t + b cos t`, and its deviation at the start decays.
     fn linear_way(chase: &Chase) -> Vec<State> {
         let k = chase.arm.stiffness;
         let share = k / ((k + 1.0) * (k + 1.0));
@@ -371,7 +376,7 @@ mod tests {
         }
     }
 
-    /// sin t = 0.6 on the way down: until then the arm is pushed into its stop.
+    /// Time of sin t = 0.6 on the way down: until then the arm is pushed into its stop.
     #[test]
     fn the_stop_is_met_and_left() {
         let chase = Chase::new(ArmKind::Collision, 1e2, 60.0, 3.0);
@@ -389,15 +394,15 @@ mod tests {
         Setting { arm, stiffness }.errors(seconds)
     }
 
-    /// Error of a method's position with a number of steps per frame.
+    /// Position error of a method with a number of steps per frame.
     fn error(points: &[ArmPoint], method: &str, substeps: u32) -> f64 {
         let is_it = |p: &&ArmPoint| (p.method, p.substeps) == (method, substeps);
         points.iter().find(is_it).expect(method).position_error
     }
 
-    /// Powers of the step by which the error falls, behind straight lines.
+    /// Orders of convergence, behind straight lines.
     ///
-    /// From 1 to 2, to 4 and to 16 steps per frame; methods get the target as such lines.
+    /// From 1 to 2, to 4 and to 16 steps per frame; methods receive the target as such lines.
     fn orders(kind: ArmKind, seconds: f64, method: &Method) -> [f64; 3] {
         let chase = Chase::new(kind, 1e2, 60.0, seconds);
         let way = chase.states(rk4, 200);

@@ -1,4 +1,4 @@
-//! The study of spring arms: errors, time, stability, and which method to take.
+//! Study of spring arms: errors, time, stability, and the recommended method.
 //!
 //! Every method with every number of steps per frame on every arm and stiffness.
 
@@ -13,28 +13,28 @@ use super::rated::{Recommendation, recommended};
 use crate::measure::{OverProcesses, TimedTask};
 use crate::statistics::{Estimate, flat};
 
-/// Steps per frame that each method is tried with.
+/// Numbers of steps per frame that each method is tried with.
 const SUBSTEPS: [u32; 5] = [1, 2, 4, 16, 64];
 
 /// Stiffnesses, k in 1/s^2.
 const STIFFNESSES: [f64; 3] = [1e2, 1e4, 1e6];
 /// Frames per second.
 pub const RATE_HZ: f64 = 60.0;
-/// Simulated time over which the largest error is taken.
+/// Simulated time over which the largest error is taken, in seconds.
 pub const SECONDS: f64 = 10.0;
-/// Largest position error of a method to recommend; the target swings by 1.
+/// Largest position error of a recommended method; the target's amplitude is 1.
 pub const ARM_TOLERANCE: f64 = 1e-3;
 
-/// A method that is stable up to here is stable always.
+/// A method that is stable up to this `omega h` counts as always stable.
 const ALWAYS: f64 = 1e4;
 
-/// Slack of the conditions of stability, for rounding.
+/// Slack of the stability conditions, for rounding.
 const SLACK: f64 = 1e-12;
 
-/// Tests that an error does not grow behind a target at rest, where `omega` is one.
+/// Tests that an error does not grow behind a target at rest, where `omega` is 1.
 ///
-/// Both eigenvalues of the matrix of one step lie in the unit circle by Jury's conditions
-/// `|trace| <= 1 + det` and `det <= 1`, which need no square root.
+/// Both eigenvalues of the matrix of one step lie in the unit circle if Jury's conditions `|trace|
+/// <= 1 + det` and `det <= 1` hold; these need no square root.
 fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
     let arm = Arm {
         stiffness: 1.0,
@@ -48,7 +48,7 @@ fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
     trace.abs() <= 1.0 + determinant + SLACK && determinant <= 1.0 + SLACK
 }
 
-/// The least `omega h` at which a method is unstable, by bisection.
+/// Smallest unstable `omega h` of a method, by bisection.
 ///
 /// `None` if it is stable up to [`ALWAYS`].
 fn limit(method: &Method, zeta: f64) -> Option<f64> {
@@ -66,14 +66,13 @@ fn limit(method: &Method, zeta: f64) -> Option<f64> {
     Some(good)
 }
 
-/// A method and its limit of stability.
+/// A method and its stability limit.
 #[derive(Debug, Serialize)]
 pub struct Stability {
     /// The method.
     #[serde(flatten)]
     pub method: &'static Method,
-    /// The least `omega h` where it is no longer stable at critical damping; null if it
-    /// is stable always.
+    /// Smallest unstable `omega h` at critical damping; null if always stable.
     pub limit_omega_h: Option<f64>,
 }
 
@@ -87,37 +86,36 @@ pub fn stability() -> impl Iterator<Item = Stability> {
 /// A critically damped arm.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Setting {
-    /// The kind of arm.
+    /// Kind of arm.
     pub arm: ArmKind,
     /// k in 1/s^2.
     pub stiffness: f64,
 }
 
-/// One method with one number of steps per frame on one arm.
+/// Result of one method with one number of steps per frame on one arm.
 #[derive(Debug, Serialize)]
 pub struct ArmPoint {
-    /// The arm.
+    /// Arm.
     #[serde(flatten)]
     pub setting: Setting,
     /// Name of the method.
     pub method: &'static str,
-    /// Equal steps per frame.
+    /// Number of equal steps per frame.
     pub substeps: u32,
-    /// Largest distance from the arm's true way at the ends of all frames; NaN if it
-    /// blew up.
+    /// Largest position error at the ends of all frames; NaN if it diverged.
     pub position_error: f64,
-    /// Thread CPU time per simulated second, with its 95 % interval.
+    /// Thread CPU time per simulated second, in microseconds, with its 95 % interval.
     #[serde(flatten, serialize_with = "flat::us_per_second")]
     pub us_per_second: Option<Estimate>,
 }
 
-/// The method to take for an arm.
+/// Recommended method for an arm.
 #[derive(Debug, Serialize)]
 pub struct ArmChoice {
-    /// The arm.
+    /// Arm.
     #[serde(flatten)]
     pub setting: Setting,
-    /// With the number of steps, and why.
+    /// Method, with the number of steps and the reason.
     #[serde(flatten)]
     pub choice: Recommendation,
 }
@@ -134,10 +132,10 @@ fn efforts() -> impl Iterator<Item = (&'static Method, u32)> {
     methods.flat_map(|method| SUBSTEPS.map(|n| (method, n)))
 }
 
-/// `omega h` of the steps of the reference: RK4 is then off by less than 1e-12.
+/// `omega h` of the reference's steps: the error of RK4 is then below 1e-12.
 const REFERENCE_STEP: f64 = 1e-3;
 
-/// An error of something that has blown up, in units of the arm's own motion.
+/// Error that counts as divergence, in units of the arm's own motion.
 const BLOWN_UP: f64 = 1e3;
 
 impl Setting {
@@ -145,7 +143,7 @@ impl Setting {
         Chase::new(self.arm, self.stiffness, RATE_HZ, seconds)
     }
 
-    /// The errors of all points.
+    /// Errors of all methods and numbers of steps on this arm.
     pub fn errors(self, seconds: f64) -> Vec<ArmPoint> {
         let chase = self.chase(seconds);
         let omega_h = self.stiffness.sqrt() / RATE_HZ;
@@ -165,7 +163,7 @@ impl Setting {
         efforts().map(point).collect()
     }
 
-    /// Tasks of all points: the first second, the arm on its way in.
+    /// Tasks of all points: the first second, while the arm settles.
     pub fn tasks(self) -> impl Iterator<Item = TimedTask<'static>> {
         efforts().map(move |(method, substeps)| {
             let chase = self.chase(1.0);
@@ -174,9 +172,9 @@ impl Setting {
     }
 }
 
-/// Fills in the times of the points of one setting and chooses a method.
+/// Fills in the times of the points of one setting and recommends a method.
 ///
-/// The tasks of the setting begin at `first`.
+/// The setting's tasks start at index `first`.
 pub fn conclude(points: &mut [ArmPoint], times: &OverProcesses, first: usize) -> ArmChoice {
     let mut candidates = Vec::new();
     for (task, point) in (first..).zip(&mut *points) {
@@ -219,9 +217,9 @@ mod tests {
 
     /// The eigenvalues are `omega (-zeta +- sqrt(zeta^2 - 1))`.
     ///
-    /// Explicit Euler and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
-    /// root of z^3 + 4 z^2 + 12 z + 24: Hairer and Wanner 1996, "Solving Ordinary
-    /// Differential Equations II", IV.2), semi-implicit Euler by Jury's conditions.
+    /// Explicit Euler and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to
+    /// the root of z^3 + 4 z^2 + 12 z + 24: Hairer and Wanner 1996, "Solving Ordinary Differential
+    /// Equations II", IV.2), semi-implicit Euler by Jury's conditions.
     #[test]
     fn limits_found_are_the_limits_of_the_formulas() {
         for zeta in [0.1f64, 0.5, 1.0, 2.0] {

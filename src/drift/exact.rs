@@ -1,16 +1,17 @@
-//! The exact turn in arithmetic of about 200 bits, and how far axes are from it.
+//! Exact rotation in about 200 bits, and the errors of axes against it.
 
 use glam::{DMat3, DVec3};
 
 use crate::arithmetic::{Expansion, exact};
 
-/// Leading doubles kept of every number: about 2e-63 relative. Raised to the
-/// power 1e10, that still leaves more than 50 digits.
+/// Leading doubles kept of every number: about 2e-63 relative.
+///
+/// After raising to the power 1e10, more than 50 digits are left.
 const TERMS: usize = 4;
 
 /// Sine and cosine of an angle in degrees.
 ///
-/// Whole turns are taken off first, which is exact in degrees.
+/// Whole turns are subtracted first, which is exact in degrees.
 fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     let turns = (degrees.estimate() / 360.0).round();
     let rest = degrees - &Expansion::product(360.0, turns);
@@ -18,7 +19,7 @@ fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     exact::sin_cos(&radians.leading(TERMS), TERMS)
 }
 
-/// Columns of numbers of 200 bits: u, v and n of a camera basis.
+/// Columns u, v and n of a camera basis, as numbers of 200 bits.
 #[derive(Clone, Debug)]
 pub struct Matrix([exact::ExactVector; 3]);
 
@@ -32,7 +33,7 @@ impl Matrix {
         Matrix::from_entries(|i, j| self.0[i][j].clone())
     }
 
-    /// The product of the transpose with another matrix.
+    /// Product of the transpose with another matrix.
     fn transposed_times(&self, other: &Self) -> Self {
         let entry = |i: usize, j: usize| exact::dot(&self.0[i], &other.0[j]);
         Matrix::from_entries(|i, j| entry(i, j).leading(TERMS))
@@ -42,7 +43,7 @@ impl Matrix {
         self.transposed().transposed_times(other)
     }
 
-    /// The matrix `exponent` times over, by repeated squaring.
+    /// Raises the matrix to a power by repeated squaring.
     pub fn power(&self, exponent: u64) -> Self {
         match exponent {
             0 => Matrix::from(DMat3::IDENTITY),
@@ -51,7 +52,7 @@ impl Matrix {
         }
     }
 
-    /// The turn by exact degrees about the axis 0, 1 or 2, counter-clockwise.
+    /// Counter-clockwise rotation by exact degrees about the axis 0, 1 or 2.
     pub fn about(axis: usize, degrees: &Expansion) -> Self {
         let (sin, cos) = sin_cos_degrees(degrees);
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -62,7 +63,7 @@ impl Matrix {
         turn
     }
 
-    /// The matrix less the identity, rounded.
+    /// The matrix minus the identity, rounded.
     fn beyond_identity(&self) -> DMat3 {
         let one = Matrix::from(DMat3::IDENTITY);
         let entry = |i: usize, j: usize| (&self.0[j][i] - &one.0[j][i]).estimate();
@@ -76,7 +77,7 @@ impl From<DMat3> for Matrix {
     }
 }
 
-/// The larger of two errors. NaN is the largest: `max` would lose it.
+/// Larger of two errors; NaN counts as the largest, which `max` would drop.
 pub fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
@@ -86,10 +87,10 @@ fn largest(matrix: &DMat3) -> f64 {
     sizes.into_iter().fold(0.0, larger)
 }
 
-/// Most steps of Newton's iteration: in more, the rounding of a zero grows to one.
+/// Most Newton steps: more would amplify the rounding of a zero to one.
 const MOST_STEPS: u32 = 60;
 
-/// Errors of axes X that ought to be R, without cancellation.
+/// Errors of axes X whose exact value is R, without cancellation.
 ///
 /// Largest entry of `X^T X - I`, which is zero for a rotation, and the angle in radians.
 pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 2] {
@@ -99,21 +100,21 @@ pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 2] {
     [largest(&gram), angle(off)]
 }
 
-/// The angle of the rotation nearest to I + E, its polar factor; NaN without one.
+/// Angle of the rotation nearest to I + E, its polar factor; NaN without one.
 ///
-/// Newton's iteration Y(3I - Y^T Y)/2 (Higham 1986, eq. 3.1 in its inverse-free form)
-/// for Y = I + E, in terms of E: an angle of any size keeps its digits.
+/// Newton's iteration Y(3I - Y^T Y)/2 (Higham 1986, eq. 3.1 in its inverse-free form) for Y = I +
+/// E, in terms of E: an angle of any size keeps its digits.
 fn angle(mut off: DMat3) -> f64 {
-    // Scaled so that the squares of the singular values add to 3: each is
-    // then below sqrt(3), where the iteration converges.
+    // Scaled so that the squares of the singular values add to 3: each singular value is then at
+    // most sqrt(3), where the iteration converges.
     let entries = (DMat3::IDENTITY + off).to_cols_array();
     let scale = (3.0 / entries.iter().map(|x| x * x).sum::<f64>()).sqrt();
     off = off * scale + DMat3::IDENTITY * (scale - 1.0);
     for _ in 0..MOST_STEPS {
         let gram = off + off.transpose() + off.transpose() * off;
         if largest(&gram) < 1e-14 {
-            // trace = 1 + 2 cos; the antisymmetric part is sin times the axis.
-            // Together they give every angle to full precision.
+            // trace = 1 + 2 cos; the antisymmetric part is sin times the axis. Together they give
+            // every angle to full precision.
             let apart = off - off.transpose();
             let twice = DVec3::new(apart.y_axis.z, apart.z_axis.x, apart.x_axis.y);
             let trace = off.x_axis.x + off.y_axis.y + off.z_axis.z;
@@ -147,7 +148,7 @@ mod tests {
     fn sines_are_true_to_fifty_digits() {
         let one = Expansion::from(1.0);
         let off = |x: &Expansion, wanted: &Expansion| (x - wanted).estimate().abs();
-        // Angles with a sine or cosine of closed form, whole turns included.
+        // Angles whose sine or cosine has a closed form, whole turns included.
         let half = Expansion::from(0.5);
         let root = half.sqrt(TERMS + 1);
         for turns in [-1e9, 0.0, 1.0, 7e6] {
@@ -166,8 +167,9 @@ mod tests {
         }
     }
 
-    /// The power of the step as a quaternion, one factor after the other by
-    /// half angles: neither the matrices nor the squaring of `power`.
+    /// The power of the step as a quaternion, one factor at a time by half angles.
+    ///
+    /// Uses neither the matrices nor the squaring of `power`.
     fn by_quaternions(steps: u64) -> Matrix {
         type Quaternion = [Expansion; 4];
         let half = Expansion::from(0.5);
@@ -237,8 +239,8 @@ mod tests {
 
     #[test]
     fn ten_million_steps_are_good_to_forty_digits() {
-        // Turns about one axis have a closed form, and a power is a product of
-        // powers: 10^7 = 3^14 + 5217031.
+        // Rotations about one axis have a closed form, and a power is a product of powers: 10^7 =
+        // 3^14 + 5217031.
         let about = Matrix::about(2, &degrees(0.7)).power(10_000_000);
         let closed = Matrix::about(2, &Expansion::product(0.7, 1e7));
         assert!(apart(&about, &closed) < 1e-45);
@@ -273,7 +275,7 @@ mod tests {
 
     #[test]
     fn angles_are_measured_from_1e_15_to_pi() {
-        // Axes that are exactly so: the reference is what is turned.
+        // Axes with exact errors: the reference is rotated instead.
         let stretched = DMat3::from_diagonal(DVec3::new(1.2, 1.0, 0.9));
         for degree in [1e-15, 1e-9, 0.3, 90.0, 179.999_999, 180.0] {
             for axes in [DMat3::IDENTITY, stretched] {

@@ -1,6 +1,7 @@
-//! Ways to keep a camera basis while it is turned step by step.
+//! Methods that keep a camera basis while it is rotated step by step.
 //!
-//! Walks of many equal steps, with looks on the way, as tasks of the timed pass.
+//! A walk takes many equal steps and records the basis on the way; walks are tasks of the timed
+//! pass.
 
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -13,18 +14,18 @@ use crate::camera::{self, look_at};
 use crate::kernel::each;
 use crate::measure::TimedTask;
 
-/// Yaw, pitch and roll of every step, in degrees about the camera's own axes.
+/// Yaw, pitch and roll of each step, in degrees about the camera's own axes.
 ///
-/// In this order, as [`camera::Frame`] turns. The doubles are taken as exact.
+/// In this order, as [`camera::Frame`] rotates. The doubles count as exact.
 pub type Turn = [f64; 3];
 
-/// Slow and about no axis in particular.
+/// A slow rotation about no special axis.
 pub const STEADY: Turn = [0.7, 0.3, 0.1];
 
-/// Takes equal steps: the axes after each of these numbers of them.
+/// Takes equal steps; returns the axes after each of these numbers of steps.
 pub type Walk = fn(RangeInclusive<u64>) -> Vec<DMat3>;
 
-/// A [`Walk`] by what a step does to the walker and where that is then.
+/// Runs a [`Walk`]: `step` advances the walker, `place` reads its axes.
 pub fn walk<W>(
     mut walker: W,
     looks: RangeInclusive<u64>,
@@ -35,7 +36,7 @@ pub fn walk<W>(
     let mut places = Vec::new();
     for look in looks {
         for _ in taken..look {
-            // Hidden, so that nothing is computed once for all steps.
+            // `black_box`, so that nothing is computed once for all steps.
             step(&mut walker, black_box(&STEADY));
         }
         taken = look;
@@ -44,23 +45,23 @@ pub fn walk<W>(
     places
 }
 
-/// Queries of a round of the timed pass: all the same.
+/// Queries in a round of the timed pass, all alike.
 pub const QUERIES: usize = 8;
 
-/// Steps of a frame in one query.
+/// Steps of a basis in one query.
 pub const QUERY_STEPS: u64 = 500;
 
-/// A task of the timed pass that asks for nothing.
+/// Task of the timed pass without an answer.
 pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
     TimedTask::new(vec![0; QUERIES], move |_, _| run())
 }
 
-/// The task of [`QUERY_STEPS`] equal steps.
+/// Task of [`QUERY_STEPS`] equal steps.
 pub fn walking(walk: Walk) -> TimedTask<'static> {
     task(move || drop(walk(QUERY_STEPS..=QUERY_STEPS)))
 }
 
-/// Corrections of the axes of a frame.
+/// No correction of the axes of a basis.
 pub const NONE: u8 = 0;
 pub const GRAM_SCHMIDT: u8 = 1;
 pub const POLAR: u8 = 2;
@@ -68,7 +69,7 @@ pub const POLAR: u8 = 2;
 /// Rotations between two polar corrections, as in the toolkit's camera.
 pub const CORRECT_EVERY: u32 = 100;
 
-/// The same text in both precisions.
+/// Defines the same code in both precisions.
 macro_rules! precision {
     ($module:ident, $real:ident, $vector:ident, $matrix:ident, $sin:path, $cos:path) => {
         pub mod $module {
@@ -90,8 +91,9 @@ macro_rules! precision {
                 DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array().map(f64::from)))
             }
 
-            /// u, v and n after yaw, pitch and roll in radians: the formulas of
-            /// `camera::controls`, inlined as those are.
+            /// Axes u, v and n after yaw, pitch and roll in radians.
+            ///
+            /// The formulas of `camera::controls`, inlined like those.
             #[inline(always)]
             pub fn turned([mut u, mut v, mut n]: [$vector; 3], by: [$real; 3]) -> [$vector; 3] {
                 let [(sin, cos), pitch, roll] = each(by, sin_cos);
@@ -103,8 +105,9 @@ macro_rules! precision {
                 [u, v, n]
             }
 
-            /// Axes that are turned in place. Every step gets its angles as if from a
-            /// mouse, and takes their sines and cosines.
+            /// Rotates the axes in place.
+            ///
+            /// Each step receives its angles as if from a mouse, and takes their sines and cosines.
             pub fn frame<const CORRECTION: u8>(looks: RangeInclusive<u64>) -> Vec<DMat3> {
                 let step = |(axes, rotations): &mut ([$vector; 3], u32), turn: &Turn| {
                     *axes = turned(*axes, each(*turn, |angle| angle as $real * DEGREE));
@@ -134,7 +137,7 @@ macro_rules! precision {
 precision!(single, f32, Vec3, Mat3, libm::sinf, libm::cosf);
 precision!(double, f64, DVec3, DMat3, libm::sin, libm::cos);
 
-/// An f32 quaternion that is multiplied by the step's.
+/// Multiplies an f32 quaternion by that of the step.
 pub fn quaternion(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |q: &mut Quat, turn: &Turn| {
         let half = each(*turn, |angle| sin_cos(angle as f32 * DEGREE * 0.5));
@@ -147,7 +150,7 @@ pub fn quaternion(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     walk(Quat::IDENTITY, looks, step, axes)
 }
 
-/// Sums of f32 angles in radians, and the axes that follow from them.
+/// Sums f32 angles in radians; computes the axes from the sums.
 pub fn radians(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     let step = |(sums, axes): &mut ([f32; 3], [Vec3; 3]), turn: &Turn| {
         *sums = each([0, 1, 2], |k| sums[k] + turn[k] as f32 * DEGREE);
@@ -157,7 +160,7 @@ pub fn radians(looks: RangeInclusive<u64>) -> Vec<DMat3> {
     walk(([0.0; 3], LEVEL), looks, step, axes)
 }
 
-/// Basis of this toolkit's camera, with angles that are stretched.
+/// Uses this toolkit's camera basis, with angles multiplied by `stretch`.
 #[inline(always)]
 pub fn toolkit(looks: RangeInclusive<u64>, stretch: f64) -> Vec<DMat3> {
     let level = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
@@ -171,7 +174,7 @@ pub fn toolkit(looks: RangeInclusive<u64>, stretch: f64) -> Vec<DMat3> {
     walk(level, looks, step, axes)
 }
 
-/// The lecture's programs take pi for this.
+/// Ratio of the lecture's value of pi to pi.
 #[expect(clippy::approx_constant, reason = "it is what is measured")]
 pub const LECTURE: f64 = 3.142 / PI;
 

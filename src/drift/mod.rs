@@ -1,6 +1,6 @@
-//! Small errors that add up in bases and spring arms of cameras.
+//! Accumulated errors of camera bases and of spring arms.
 //!
-//! The methods that are compared, their references, and which method to take.
+//! Compares methods with their references and recommends one.
 
 mod arm;
 mod arm_study;
@@ -24,10 +24,10 @@ use frames::{QUERIES, QUERY_STEPS, walking};
 use rated::recommended;
 use rotation::{METHODS, Method, Period};
 
-/// The most steps: beyond, an f32 frame overflows and a run takes hours.
+/// Most steps: beyond, an f32 frame overflows and a run takes hours.
 const MOST_STEPS: f64 = 1e9;
 
-/// `1e7` or `10M`.
+/// Parses a number of steps, such as `1e7` or `10M`.
 pub fn steps(text: &str) -> Result<u64, SpecError> {
     let steps = parse_number(text)
         .filter(|_| !text.trim_end().ends_with('%'))
@@ -36,20 +36,20 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
     values::expected(steps, what).map(|steps| steps as u64)
 }
 
-/// Largest error of a way to turn to recommend, radians.
+/// Largest error of a recommended rotation method, radians.
 pub const TOLERANCE_RAD: f64 = 1e-6;
 
-/// A way to turn, with its errors and time.
+/// A rotation method with its errors and time.
 #[derive(Debug, Serialize)]
 pub struct Rotation {
-    /// The way.
+    /// Rotation method.
     #[serde(flatten)]
     pub method: &'static Method,
     /// Largest entry of `X^T X - I` for the axes X.
     pub orthogonality_error: f64,
-    /// Between the rotation nearest to the axes and the exact one; NaN if it is lost.
+    /// Angle between the rotation nearest to the axes and the exact one; NaN if lost.
     pub angle_error_rad: f64,
-    /// Thread CPU time with its 95 % interval, which needs three processes.
+    /// Thread CPU time per step with its 95 % interval, which needs three processes.
     #[serde(flatten, serialize_with = "flat::ns_per_step")]
     pub time_per_step: Option<Estimate>,
 }
@@ -65,30 +65,30 @@ impl Rotation {
         }
     }
 
-    /// The larger error; NaN for a basis that is lost.
+    /// The larger of the two errors; NaN for a basis that is lost.
     fn error(&self) -> f64 {
         larger(self.angle_error_rad, self.orthogonality_error)
     }
 }
 
-/// Everything `cullbench drift` finds.
+/// Results of `cullbench drift`.
 #[derive(Default, Debug, Serialize)]
 pub struct DriftReport {
-    /// Steps of the camera bases.
+    /// Number of steps of the camera bases.
     pub steps: u64,
-    /// Processes that were timed; an interval needs three or more.
+    /// Number of timed processes; an interval needs three or more.
     pub processes: usize,
-    /// In each process.
+    /// Rounds in each process.
     pub rounds: usize,
-    /// Ways to turn.
+    /// Rotation methods.
     pub rotation: Vec<Rotation>,
-    /// Which way to turn.
+    /// Recommended rotation method.
     pub recommended_rotation: Recommendation,
     /// Methods that step spring arms.
     pub arm_methods: Vec<Stability>,
     /// Every method with every number of steps on every arm.
     pub arm_points: Vec<ArmPoint>,
-    /// The method to take for every arm.
+    /// Recommended method for every arm.
     pub arm_choices: Vec<ArmChoice>,
 }
 
@@ -126,7 +126,7 @@ pub fn time(schedule: &Schedule, protocol: &Protocol) -> ProcessTimes {
 }
 
 impl DriftReport {
-    /// Fills in the times of all processes, `rounds` in each, and the choices.
+    /// Fills in the times of all processes, `rounds` in each, and the recommendations.
     pub fn conclude(&mut self, processes: &[ProcessTimes], rounds: u32) {
         let times = OverProcesses::of(processes);
         (self.processes, self.rounds) = (processes.len(), rounds as usize);
@@ -148,9 +148,9 @@ impl DriftReport {
     }
 }
 
-/// Error of a way to turn after a number of steps, and a query of some of them.
+/// Error of a rotation method after a number of steps, and a query for timing.
 ///
-/// A query walks [`QUERY_STEPS`]. The error of a basis that is lost is `None`.
+/// The query walks [`QUERY_STEPS`] steps. The error of a basis that is lost is `None`.
 pub fn walk(name: &str, steps: u64) -> (Option<f64>, Ask<'static>) {
     let method = METHODS.iter().find(|method| method.name == name);
     let method = method.expect("a name of the table");

@@ -1,25 +1,26 @@
-//! Which method to take, by error and time.
+//! Recommendation of a method, by error and time.
 
 use serde::Serialize;
 
 use crate::statistics::{ALPHA, ranks};
 
-/// A method to take, and why.
+/// A recommended method, with the reason.
 #[derive(Default, Debug, Serialize)]
 pub struct Recommendation {
-    /// `None` if nothing is good enough.
+    /// `None` if no method is accurate enough.
     pub name: Option<String>,
-    /// Others that are good enough and that the processes do not show to be slower.
+    /// Other accurate methods that are not significantly slower.
     pub as_fast: Vec<String>,
-    /// The choice in a sentence.
+    /// Reason in a sentence.
     pub reason: String,
 }
 
-/// A method: its name, error (NaN if it is lost), ln of its time in every process.
+/// A method: its name, error (NaN if lost), and ln of its time in every process.
 pub type Candidate = (String, f64, Vec<f64>);
 
-/// Recommends the most precise of the fastest candidates within the tolerance, by a
-/// paired test over the processes.
+/// Recommends the most accurate of the fastest candidates within the tolerance.
+///
+/// Uses a paired test over the processes.
 pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Recommendation {
     let good: Vec<_> = candidates.iter().filter(|c| c.1 <= tolerance).collect();
     let ln_ns: Vec<_> = good.iter().map(|c| c.2.clone()).collect();
@@ -44,8 +45,9 @@ pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Reco
 mod tests {
     use super::*;
 
-    /// Rough and fast, precise, slower and less precise; the third is `noise` faster or
-    /// slower in every other process.
+    /// A fast inaccurate method, an accurate one, and a slower, less accurate one.
+    ///
+    /// The time of the third varies by the factor `noise` from process to process.
     fn three(processes: i32, noise: f64) -> Vec<Candidate> {
         let row = |(name, error, ns): (&str, f64, f64)| {
             let noise = if name == "slow" { noise } else { 0.0 };

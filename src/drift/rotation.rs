@@ -1,6 +1,6 @@
-//! Drift of camera bases from the exact turn.
+//! Drift of camera bases from the exact rotation.
 //!
-//! A row of [`METHODS`] for each way to keep one.
+//! [`METHODS`] has a row for each method that keeps a basis.
 
 use std::array::from_fn;
 use std::ops::RangeInclusive;
@@ -21,19 +21,20 @@ fn turned(times: u64) -> Matrix {
     turned.times(&about(2, STEADY[2]))
 }
 
-/// One way to keep a frame.
+/// A method that keeps a camera basis.
 #[derive(Debug, Serialize)]
 pub struct Method {
     /// Name in tables and JSON.
     pub name: &'static str,
-    /// One line about what it does.
+    /// One-line description.
     pub summary: &'static str,
-    /// Yaw, pitch and roll by the sums of all angles, instead of one turn after another
-    /// about the axes as they then are. The two differ, since turns do not commute; each
-    /// method is compared with its own.
+    /// True if the method rotates by the sums of all yaw, pitch and roll angles.
+    ///
+    /// Otherwise it rotates step by step about the current axes. The results differ, since
+    /// rotations do not commute; each method is compared with its own reference.
     #[serde(skip)]
     pub sums_angles: bool,
-    /// The frame's axes u, v, n after each of some numbers of steps.
+    /// Axes u, v, n after each of some numbers of steps.
     #[serde(skip)]
     pub walk: Walk,
 }
@@ -55,16 +56,16 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, sums_angles, walk
         false, |looks| toolkit(looks, LECTURE);
 };
 
-/// Steps that figures are the maxima of: a period between two corrections of those
-/// methods that correct now and then. The moment after one says nothing of what a
-/// camera is off by.
-/// A step has three rotations: yaw, pitch and roll.
+/// Steps over which errors are maximized: one period between two corrections.
+///
+/// Some methods correct periodically, and the error just after a correction is not that of a camera
+/// in use. A step has three rotations: yaw, pitch and roll.
 const PERIOD: u64 = (CORRECT_EVERY as u64).div_ceil(3);
 
-/// Frames that methods ought to have in the [`PERIOD`] up to a number of steps.
+/// Reference bases in the [`PERIOD`] up to a number of steps.
 pub struct Period {
     steps: RangeInclusive<u64>,
-    /// Frames after turns, and after sums of angles.
+    /// Exact bases after successive rotations, and after sums of angles.
     exact: [Vec<Matrix>; 2],
 }
 
@@ -104,8 +105,8 @@ mod tests {
 
     #[test]
     fn every_method_turns_the_documented_way() {
-        // A few steps: only the rounding of the precision is left, and for the
-        // lecture's constant its 1.3e-4 of all angles.
+        // After a few steps only the rounding of the precision is left, and for the lecture's
+        // constant its 1.3e-4 of all angles.
         for method in METHODS {
             let mut found = 0.0;
             for steps in [1, 20] {
@@ -129,8 +130,8 @@ mod tests {
         let exact = Period::new(100_000);
         for method in METHODS {
             let [found, _] = method.errors(&exact);
-            // Uncorrected f32 as found when this was written; mpmath has
-            // 9.716e-12 for the power of the three f64 turns.
+            // Values of uncorrected f32 are pinned; mpmath gives 9.716e-12 for the power of the
+            // three f64 rotations.
             let (low, high) = match method.name {
                 "f32" => (2e-3, 1e-2),
                 "f64" => (9.6e-12, 9.8e-12),
@@ -141,8 +142,9 @@ mod tests {
         }
     }
 
-    /// Corrected every hundred rotations, a frame is best the moment after: that was
-    /// 1.5e-16 after 1e5 steps, where the worst moment is 30 times as bad.
+    /// Corrected every hundred rotations, a basis is best just after a correction.
+    ///
+    /// The best error was 1.5e-16 after 1e5 steps, where the worst is 30 times as large.
     #[test]
     fn figures_are_the_worst_of_a_period_between_corrections() {
         assert_eq!(PERIOD, 34);
@@ -157,8 +159,9 @@ mod tests {
         assert!(moments.any(|error| error < 1e-15));
     }
 
-    /// The lecture's 3.142/180 turns every angle too far: 1000 steps of 0.7 degrees yaw
-    /// beside the others of a step.
+    /// The lecture's 3.142/180 makes every angle too large.
+    ///
+    /// 1000 steps of 0.7 degrees yaw, with the other angles of a step.
     #[test]
     fn the_lectures_constant_is_the_largest_error_of_f64() {
         let period = Period::new(1000);

@@ -1,4 +1,4 @@
-//! Answers of a culling to every camera by the plain loop, and their errors.
+//! Answers of a culling to every camera by linear scan, and their errors.
 //!
 //! No structure and no clock.
 
@@ -22,7 +22,7 @@ pub struct Names {
     pub arithmetic: &'static str,
     /// Name of the derivation of the planes.
     pub planes: &'static str,
-    /// Factor c of the planes' epsilon.
+    /// Factor c of the planes' error margin (epsilon).
     pub epsilon: f64,
 }
 
@@ -37,7 +37,7 @@ impl Names {
     }
 }
 
-/// Every count by its name, null where there are none.
+/// Serializes every count by its name, as null if there are none.
 pub(super) fn counts_or_null<S: Serializer>(
     errors: &Option<ErrorCount>,
     serializer: S,
@@ -52,19 +52,22 @@ pub(super) fn counts_or_null<S: Serializer>(
 pub(super) struct Judged {
     pub culling: Culling,
     pub views: Vec<CameraView>,
-    /// Ids of each camera that has a truth.
+    /// Ids for each camera that has a truth.
     pub answers: Vec<Vec<ItemId>>,
-    /// Errors by camera.
+    /// Errors of each camera.
     pub errors: Vec<ErrorCount>,
-    /// How deep the deepest false negative of each camera reaches into the view, in
-    /// pixels of 1080p; 0 if there is none. Matrices without rays have none.
+    /// Depth of each camera's deepest false negative in the view, in pixels at 1080p.
+    ///
+    /// 0 if there is none. A matrix without rays has no entry.
     pub worst_miss_px: Vec<f64>,
-    /// Why there are no such views.
+    /// Reason why the views cannot be made.
     pub refused: Option<String>,
 }
 
 impl Judged {
-    /// Answers judged by the truth about each camera; the views alone without any.
+    /// Computes the answers and compares them with the truth about each camera.
+    ///
+    /// Without truths only the views are made.
     pub fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Judged {
         let around = scene.surroundings();
         let mut judged = Judged {
@@ -90,9 +93,10 @@ impl Judged {
     }
 }
 
-/// How deep the deepest false negative reaches into the view, in pixels of a view
-/// 1080 pixels high: its depth in world units over the height that the view has
-/// where the item is nearest. `None` for a matrix without rays, which has no height.
+/// Depth of the deepest false negative in the view, in pixels of a 1080-pixel view.
+///
+/// This is the depth in world units over the height that the view has where the item is nearest.
+/// `None` for a matrix without rays, which has no height.
 fn worst_miss_px(camera: &Camera, scene: &Scene, truth: &Truth, answer: &[ItemId]) -> Option<f64> {
     const PIXELS: f64 = 1080.0;
     let camera = camera.unprojected().unwrap_or(*camera);
@@ -119,13 +123,13 @@ mod tests {
 
     #[test]
     fn a_miss_has_pixels() {
-        // Ten high at a depth of ten: 108 pixels per unit there.
+        // The view is ten high at a depth of ten: 108 pixels per unit there.
         let lens = Lens::perspective(2.0 * 0.5f64.atan().to_degrees(), 1.0, 1.0, Some(100.0));
         let camera = Camera {
             frame: look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap(),
             lens: lens.unwrap(),
         };
-        // In, reaching one unit in from the left where it is nearest; out; in.
+        // In the view, reaching one unit in from the left where it is nearest; out; in.
         let cube = |at: DVec3| WorldBox::new(at, at + 2.0);
         let boxes = [
             cube(DVec3::new(10.0, -6.0, 0.0)),
@@ -137,7 +141,7 @@ mod tests {
         let worst = |camera: &Camera, of: &[ItemId]| worst_miss_px(camera, &scene, &truth, of);
         assert_eq!(worst(&camera, &[0, 2]), Some(0.0));
         let px = worst(&camera, &[2]).unwrap();
-        // At the far face, 12 ahead, the view is 12 high: 2 less 0 units deep.
+        // At the far face, at depth 12, the view is 12 high: 2 less 0 units deep.
         assert!((100.0..220.0).contains(&px), "{px}");
         // The same camera as a matrix.
         let matrix = camera.lens.projection(ClipSpace::D3d) * camera.frame.world_to_eye();
@@ -145,7 +149,7 @@ mod tests {
         let matrix = Camera::of_matrix(rows, MatrixConvention::ColumnD3d).unwrap();
         let of_matrix = worst(&matrix, &[2]).unwrap();
         assert!((of_matrix / px - 1.0).abs() < 1e-9, "{of_matrix}");
-        // A sheared one has no rays, and so no pixels.
+        // A sheared matrix has no rays, and so no pixels.
         let mut sheared = rows;
         sheared[0][2] += 0.01;
         let sheared = Camera::of_matrix(sheared, MatrixConvention::ColumnD3d).unwrap();

@@ -1,7 +1,7 @@
 //! Error against run time of culling tests, arithmetic and plane derivations.
 //!
-//! Errors of each, and its time on each structure. Owns the points of that diagram
-//! and the sweeps; the truth is the oracle's, the clock is `measure`'s.
+//! Contains the points of that diagram (the errors of each, and its time on each structure) and the
+//! sweeps; the truth comes from the oracle, the clock from `measure`.
 
 mod judged;
 mod point;

@@ -1,6 +1,6 @@
 //! A point of the diagram: a structure with a culling, its errors and its time.
 //!
-//! Also when one point dominates another.
+//! Also decides whether one point dominates another.
 
 use std::ops::Add;
 
@@ -16,12 +16,12 @@ use crate::verify::ErrorCount;
 pub(super) struct Dimension {
     /// Value of the point.
     value: f64,
-    /// Value at each camera; nothing for a cost without a sampling error.
+    /// Value at each camera; empty for a cost without a sampling error.
     by_camera: Vec<f64>,
 }
 
 impl Dimension {
-    /// A value that `fold` makes of those of all cameras.
+    /// Folds the values of all cameras into one, starting at 0.
     pub fn of(by_camera: impl Iterator<Item = f64>, fold: fn(f64, f64) -> f64) -> Dimension {
         let by_camera: Vec<f64> = by_camera.collect();
         Dimension {
@@ -30,7 +30,7 @@ impl Dimension {
         }
     }
 
-    /// A cost that is the same for all cameras.
+    /// A cost that is independent of the cameras.
     pub fn fixed(value: f64) -> Dimension {
         Dimension {
             value,
@@ -49,41 +49,41 @@ pub struct Point {
     pub names: Names,
     /// False positives / visible items, by camera.
     pub excess: Option<Estimate>,
-    /// Visible items that were not returned, in millionths.
+    /// False negatives per million visible items.
     pub false_negative_ppm: Option<Estimate>,
-    /// The same as counts; null for what is refused.
+    /// Error counts; null if the culling was refused.
     #[serde(flatten, serialize_with = "counts_or_null")]
     pub counts: Option<ErrorCount>,
-    /// How deep the deepest false negative reaches into the view, in pixels of a
-    /// view 1080 pixels high.
+    /// Depth of the deepest false negative in the view, in pixels at 1080p.
     pub worst_miss_px: Option<f64>,
     /// `query_ns` / number of items.
     pub ns_per_item: Option<f64>,
     /// Memory of nodes and items / number of items.
     pub memory_bytes_per_item: f64,
-    /// How building, counting and timing ended.
+    /// Outcome of building, counting and timing.
     pub status: Status,
-    /// Why, where the status is not ok.
+    /// Reason, unless the status is ok.
     pub reason: Option<String>,
-    /// Thread CPU time of a query, mean over the cameras.
+    /// Thread CPU time per query, mean over the cameras.
     #[serde(flatten, serialize_with = "flat::query_ns")]
     pub time: Option<Estimate>,
-    /// Index of a point of the front that is no worse in anything and better in
-    /// something, where the samples show that it is dominated.
+    /// Index of a front point that significantly dominates this one.
+    ///
+    /// The front point is no worse in any dimension and better in one, as the samples show.
     pub dominated_by: Option<usize>,
-    /// True if it is dominated by the values alone: it shares the front.
+    /// True if the values are dominated, but not significantly: it shares the front.
     pub is_tie: bool,
-    /// True if no point is shown to dominate it.
+    /// True if no point significantly dominates it.
     pub on_front: bool,
     #[serde(skip)]
     dimensions: Vec<Dimension>,
-    /// Its place among the points before they are sorted, if it has a time.
+    /// Index among the points before sorting, if it has a time.
     #[serde(skip)]
     way: Option<usize>,
 }
 
 impl Point {
-    /// A culling's errors as a point of a structure, without a time.
+    /// Point for a structure with a culling's errors, without a time.
     pub(super) fn of(judged: &Judged, structure: &str, memory_bytes_per_item: f64) -> Point {
         let (errors, depths) = (&judged.errors[..], &judged.worst_miss_px);
         let is_judged = judged.refused.is_none();
@@ -118,7 +118,7 @@ impl Point {
         }
     }
 
-    /// Takes over what is wrong; true if nothing is.
+    /// Copies a failure into status and reason; returns true if there is none.
     pub(super) fn accepts(&mut self, wrong: Option<&Verdict>) -> bool {
         if let Some(wrong) = wrong {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
@@ -126,7 +126,7 @@ impl Point {
         wrong.is_none()
     }
 
-    /// Takes over the time of a way, or why it has none.
+    /// Stores the time of a task, or the reason why it has none.
     pub(super) fn time(&mut self, times: &OverProcesses<(usize, bool)>, way: usize, items: usize) {
         self.accepts(times.failure((way, false)));
         self.time = times.ns((way, false));
@@ -134,20 +134,21 @@ impl Point {
         self.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
     }
 
-    /// Time of a query, ns.
+    /// Time per query, ns.
     pub fn query_ns(&self) -> Option<f64> {
         Some(self.time?.value)
     }
 
-    /// Values of which less is better: the dimensions and time.
+    /// Values of which less is better: the dimensions and the time.
     fn values(&self) -> Vec<f64> {
         let dimensions = self.dimensions.iter().map(|d| d.value);
         dimensions.chain(self.query_ns()).collect()
     }
 }
 
-/// Sorts the points by time, what has none last, and marks the front of the others:
-/// errors are compared camera by camera, times process by process.
+/// Sorts the points by time, untimed ones last, and marks the front.
+///
+/// Errors are compared camera by camera, times process by process.
 pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usize) -> bool) {
     let order = |p: &Point| p.query_ns().unwrap_or(f64::INFINITY);
     points.sort_by(|a, b| order(a).total_cmp(&order(b)));
@@ -176,8 +177,10 @@ pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usiz
 mod tests {
     use super::*;
 
-    /// A point with false negatives, dropped touches and false positives, each the
-    /// same number at four cameras, the depth of its worst miss, its memory and time.
+    /// Point with the given errors, depth of its worst miss, memory and time.
+    ///
+    /// `errors` are false negatives, dropped touches and false positives, spread evenly over four
+    /// cameras.
     fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point {
         let sampled = |value: f64| Dimension::of([value / 4.0; 4].into_iter(), f64::add);
         let mut dimensions = errors.map(sampled).to_vec();
@@ -195,7 +198,7 @@ mod tests {
         }
     }
 
-    /// Times in steps of ten are told apart, those within a step are not.
+    /// Times differ significantly if they lie in different tens.
     fn marked(points: &[Point]) -> Vec<(Option<usize>, bool, bool)> {
         let mut points = points.to_vec();
         sort_and_mark(&mut points, &|a, b| a / 10 < b / 10);
@@ -212,13 +215,13 @@ mod tests {
             (Some(0), false, false),
         );
         let cases = [
-            // Equal errors: the faster one, shown or not.
+            // Equal errors: the faster one dominates, or ties if the difference is not significant.
             (none, 10.0, none, 20.0, [front, worse]),
             (none, 10.0, none, 11.0, [front, tie]),
-            // Slower by a little, with fewer errors: both stay.
+            // Slightly slower, with fewer errors: both stay.
             (some, 10.0, none, 11.0, [front, front]),
             (none, 10.0, some, 11.0, [front, worse]),
-            // One error more, another one fewer: both stay, however fast.
+            // One kind of error more, another less: both stay, however fast.
             ([1.0, 0.0, 0.0], 10.0, [0.0, 0.0, 9.0], 50.0, [front, front]),
             ([0.0, 1.0, 0.0], 10.0, [0.0, 0.0, 9.0], 50.0, [front, front]),
         ];
@@ -243,7 +246,7 @@ mod tests {
         let found = marked(&[untimed, deep, plain, small, shallow]);
         let on_front: Vec<bool> = found.iter().map(|(.., on_front)| *on_front).collect();
         assert_eq!(on_front, [true, true, true, false, false]);
-        // What has no time comes last, neither on the front nor off it.
+        // Points without a time come last, not on the front.
         assert_eq!(found[4], (None, false, false));
     }
 }

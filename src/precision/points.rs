@@ -1,7 +1,7 @@
 //! Points of the diagram of one scene and path.
 //!
-//! Every structure with every culling, checked, judged against the exact truth, and timed side
-//! by side.
+//! Combines every structure with every culling, compares the answers with the exact truth, and
+//! times them side by side.
 
 use serde::Serialize;
 
@@ -26,43 +26,45 @@ pub struct Precision {
     pub path: String,
     /// Number of items.
     pub items: usize,
-    /// Cameras that were judged and timed.
+    /// Number of cameras that were evaluated and timed.
     pub cameras: usize,
-    /// Processes that were timed; an interval needs three or more.
+    /// Number of timed processes; an interval needs three or more.
     pub processes: usize,
-    /// In each process.
+    /// Rounds in each process.
     pub rounds: usize,
-    /// Time of the first structure with the default culling, entered a second
-    /// time, / time of itself: a check whose interval is to hold 1.
+    /// A/A check: time of a second copy of the first task / time of the first.
+    ///
+    /// The task is the first structure with the default culling; the interval should contain 1.
     pub twin: Option<Estimate>,
-    /// Fastest first; what could not be measured comes last.
+    /// Points, fastest first; those that could not be measured come last.
     pub points: Vec<Point>,
-    /// Indices of the points that nothing dominates, fastest first.
+    /// Indices of the undominated points, fastest first.
     pub front: Vec<usize>,
-    /// Items left out on request (`--skip-bad-items`).
+    /// Number of items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
     /// Warnings about the cameras in the scene.
     pub warnings: Vec<String>,
-    /// Seed of the sweeps and of the order of the tasks.
+    /// Seed of the sweeps and of the task order.
     pub seed: u64,
-    /// Errors by size of items and of ill-conditioned cameras, if requested.
+    /// Errors by item size and of ill-conditioned cameras, if requested.
     pub sweeps: Vec<SweepRow>,
 }
 
-/// The timed tasks, the same in every process.
+/// Plan of the timed tasks, the same in every process.
 ///
-/// Their indices among all points; true if the same is timed a second time, as a check.
+/// A key is the index among all points; true marks the second copy of a task, as a check.
 pub type PointPlan = StudyPlan<(usize, bool)>;
 
-/// All points, checked and judged, but not timed.
+/// All points, checked and evaluated, but not timed.
 pub struct Prepared {
-    /// Tasks of the other processes.
+    /// Tasks for the other processes.
     pub plan: PointPlan,
     precision: Precision,
 }
 
-/// Every test with every arithmetic, with and without epsilon; every
-/// derivation of the planes for the six-plane test.
+/// All cullings: every test with every arithmetic, with and without epsilon.
+///
+/// Also every derivation of the planes, for the six-plane test.
 fn cullings() -> Vec<Culling> {
     let standard = PlaneOptions::default();
     let bare = standard.without_epsilon();
@@ -107,11 +109,11 @@ impl<'a> Indexes<'a> {
     }
 }
 
-/// Everything that points are made of, the same in every process.
+/// Input of all points, the same in every process.
 struct Built<'a> {
     judged: Vec<Judged>,
     structures: Vec<Indexes<'a>>,
-    /// Structures that refuse the items, and are left out.
+    /// Structures that refuse the items and are left out.
     refused: Vec<&'a str>,
 }
 
@@ -133,7 +135,8 @@ impl<'a> Built<'a> {
         let (mut built, mut refused) = (Vec::new(), Vec::new());
         for spec in structures {
             match Indexes::new(spec, scene) {
-                // The same in every process; where memory lacks, a plan would not hold.
+                // Refusals are the same in every process; a lack of memory is not, so no plan could
+                // rely on it.
                 Err(BuildError::Refused { .. }) if refused.len() + 1 < structures.len() => {
                     refused.push(spec.label.as_str());
                 }
@@ -164,7 +167,7 @@ impl Way<'_> {
         index.query(self.judged.views[camera].as_any(), out);
     }
 
-    /// Compares the answers with those of the plain loop.
+    /// Compares the answers with those of the linear scan.
     fn check(self, items: usize) -> Result<(), Verdict> {
         let mut trial = Trial::new(items);
         for (n, answer) in self.judged.answers.iter().enumerate() {
@@ -173,7 +176,8 @@ impl Way<'_> {
                 let place = "not the scan of its own planes: ";
                 let mut verdict = Verdict::of(&fault, place, |_| None);
                 if verdict.status == Status::Unsafe {
-                    // Not a point that misses items by its numbers: the structure is at fault.
+                    // The numbers are not the reason for the missing items: the structure is at
+                    // fault.
                     verdict.status = Status::Wrong;
                 }
                 return Err(verdict);
@@ -183,13 +187,11 @@ impl Way<'_> {
     }
 }
 
-/// Checks and judges all points, and plans how they are timed.
-/// [`time`] and [`Prepared::conclude`] follow.
+/// Checks and evaluates all points, and plans their timing.
 ///
-/// Every answer is compared with the plain loop before it is timed, and the
-/// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
-/// and as many plain tests for each culling. Of the path at most `most` cameras are
-/// looked at, evenly spread.
+/// [`time`] and [`Prepared::conclude`] follow. Every answer is compared with the linear scan before
+/// it is timed, and the scan with the exact truth: O(cameras * items) verdicts of some 50 ns and as
+/// many plain tests for each culling. At most `most` cameras of the path are used, evenly spread.
 ///
 /// # Errors
 /// A structure that refuses the scene.
@@ -262,7 +264,7 @@ pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessT
 }
 
 impl Prepared {
-    /// The diagram from the times of all processes.
+    /// Builds the diagram from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
         let (mut precision, times) = (self.precision, self.plan.times(processes));
         let twin = self.plan.tasks.iter().find(|(key, _)| key.1);

@@ -1,9 +1,9 @@
 //! Error against the size of items and against ill-conditioned cameras.
 //!
-//! Sizes: every test, on cubes strewn about frusta. Cameras: how far from zero the world
-//! lies, how small it is, far/near, field of view and aspect, by the six-plane test with
-//! every derivation of the planes and in every arithmetic. Boxes are f32 world coordinates,
-//! on purpose, and nothing is rebased.
+//! Sizes: every test, on cubes strewn around frusta. Cameras: distance of the world from zero, its
+//! scale, far/near, field of view and aspect, by the six-plane test with every derivation of the
+//! planes and in every arithmetic. Boxes are f32 world coordinates, on purpose, and nothing is
+//! rebased.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -19,7 +19,7 @@ use crate::statistics::{Estimate, rate_of};
 use crate::verify::{ErrorCount, Truth, scan};
 
 named! {
-    /// Quantity that is swept over.
+    /// Quantity that a sweep varies.
     #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Sweep, SWEEPS {
@@ -34,14 +34,16 @@ named! {
     }
 }
 
-/// Cubes of the sweep over size for each camera of the others.
+/// Cubes in the size sweep for each camera in the other sweeps.
 const CUBES_PER_CAMERA: usize = 10_000;
-/// Fewer cameras give no interval that holds, as items of one share its planes.
+/// Least number of cameras for a reliable interval.
+///
+/// Items of one camera share its planes.
 const LEAST_CAMERAS: usize = 32;
 const MOST_CAMERAS: usize = 200;
 
 impl Sweep {
-    /// Cameras for each value, by the cubes for each size.
+    /// Number of cameras per value, for a number of cubes per size.
     pub fn cameras(self, cubes: usize) -> usize {
         match self {
             Sweep::Size => cubes.div_ceil(BATCH),
@@ -51,7 +53,7 @@ impl Sweep {
         }
     }
 
-    /// Values of the sweep, from the mildest on.
+    /// Values of the sweep, mildest first.
     pub fn values(self) -> [f64; 5] {
         match self {
             Sweep::Size => [0.01, 0.1, 0.3, 1.0, 10.0],
@@ -64,24 +66,24 @@ impl Sweep {
     }
 }
 
-/// One culling at one value of a sweep.
+/// Errors of one culling at one value of a sweep.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SweepRow {
     /// Quantity that is varied.
     pub sweep: Sweep,
-    /// Its value, in the sweep's own unit.
+    /// Value in the sweep's own unit.
     pub value: f64,
     /// Test, arithmetic and planes.
     #[serde(flatten)]
     pub names: Names,
-    /// Null if the planes cannot be made.
+    /// False negatives per million visible items; null if the planes cannot be made.
     pub false_negative_ppm: Option<Estimate>,
     /// False positives / visible items; null as above.
     pub excess: Option<Estimate>,
-    /// The same as counts; null as above.
+    /// Error counts; null as above.
     #[serde(flatten, serialize_with = "counts_or_null")]
     pub errors: Option<ErrorCount>,
-    /// Why the planes cannot be made; null if they can.
+    /// Reason why the planes cannot be made; null if they can.
     pub refused: Option<String>,
 }
 
@@ -101,9 +103,9 @@ impl SweepRow {
         }
     }
 
-    /// The figure of the row: false positives of sizes, in percent of the visible.
+    /// Error to plot: false positives for sizes, in percent of the visible items.
     ///
-    /// Missed items of cameras, in millionths.
+    /// False negatives for cameras, per million.
     pub fn error(&self) -> Option<Estimate> {
         match self.sweep {
             Sweep::Size => self.excess.map(|rate| rate.times(100.0)),
@@ -114,14 +116,14 @@ impl SweepRow {
 
 /// Mean depth of the views of a world of size 1.
 ///
-/// Depths are drawn: rounding does the same to all views by one lens.
+/// Depths are random, as rounding has the same effect on all views with one lens.
 const DEPTH: f64 = 100.0;
 /// Boxes of each camera.
 const BOXES: usize = 500;
 
-/// The tests by what they add to the faces, in f32 without epsilon.
+/// Tests of the size sweep: all four, in f32 without epsilon.
 ///
-/// The exact test also with it, and in f64.
+/// The exact test also with epsilon, and in f64.
 fn tests_of_sizes() -> Vec<Culling> {
     use CullingTest::{Exact, SixBox, SixPlane, Sphere};
     let moved = PlaneOptions::default();
@@ -133,6 +135,8 @@ fn tests_of_sizes() -> Vec<Culling> {
     all
 }
 
+/// Cullings of the camera sweeps.
+///
 /// The f32 default; f64, f32 about the eye and every derivation without epsilon.
 fn tests_of_cameras() -> Vec<Culling> {
     let bare = PlaneOptions::default().without_epsilon();
@@ -147,7 +151,7 @@ fn tests_of_cameras() -> Vec<Culling> {
     all
 }
 
-/// The tests of a sweep, before any camera is judged.
+/// Cullings of a sweep, before any camera is evaluated.
 fn unjudged(sweep: Sweep) -> Vec<Judged> {
     let tests = match sweep {
         Sweep::Size => tests_of_sizes(),
@@ -160,8 +164,9 @@ fn unjudged(sweep: Sweep) -> Vec<Judged> {
     tests.collect()
 }
 
-/// Judges `cameras` random cameras at every value with every test; the same
-/// cameras for each.
+/// Evaluates `cameras` random cameras at every value with every culling.
+///
+/// Each culling gets the same cameras.
 pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
     let mut all = sweep.values().map(|value| (value, unjudged(sweep)));
     let mut rng = SeededRng::new(seed);
@@ -202,7 +207,7 @@ fn camera_at(rng: &mut SeededRng, sweep: Sweep, value: f64) -> Option<Camera> {
     let eye = centre + rng.normal3() * 10.0 * scale;
     let (forward, beside) = (rng.normal3().normalize(), rng.normal3());
     let across = forward.cross(beside).normalize();
-    // A radian from the direction of view.
+    // One radian from the direction of view.
     let up = forward * libm::cos(1.0) + across * libm::sin(1.0);
     let depth = rng.between(0.7, 1.3) * DEPTH * scale;
     let near = depth / of(Sweep::FarOverNear, 1000.0);
@@ -212,8 +217,9 @@ fn camera_at(rng: &mut SeededRng, sweep: Sweep, value: f64) -> Option<Camera> {
     Some(Camera { frame, lens })
 }
 
-/// Boxes in and about the view, no larger than a twentieth of what it is narrow
-/// by. As a world in f32 has them: rounded to its grid, and exact from there on.
+/// Boxes in and around the view, at most a twentieth as large as it is narrow.
+///
+/// Rounded to the f32 grid, as in an f32 world, and exact from then on.
 fn boxes_about(rng: &mut SeededRng, camera: &Camera) -> Vec<Aabb> {
     let (LensKind::Perspective { aspect, .. }, Some(depth)) =
         (*camera.lens.kind(), camera.lens.far())
@@ -250,8 +256,9 @@ fn judge(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [Ju
     }
 }
 
-/// Cubes of one frustum on each axis of a grid, one in each of its cells: spread
-/// evenly they tell a frustum's share better than as many anywhere.
+/// Cubes per frustum along each axis of a grid, one in each cell.
+///
+/// Stratified cubes estimate a frustum's error better than as many independent ones.
 const GRID: usize = 8;
 const BATCH: usize = GRID * GRID * GRID;
 const FOVY_DEG: f64 = 60.0;
@@ -259,7 +266,7 @@ const ASPECT: f64 = 16.0 / 9.0;
 /// Near plane / depth.
 const NEAR: f64 = 0.01;
 
-/// A frustum in any direction, at zero, of depth 1.
+/// Frustum of depth 1 at zero, in a random direction.
 fn random_camera(rng: &mut SeededRng) -> Camera {
     let lens = Lens::perspective(FOVY_DEG, ASPECT, NEAR, Some(1.0)).expect("a lens");
     loop {
@@ -270,13 +277,13 @@ fn random_camera(rng: &mut SeededRng) -> Camera {
     }
 }
 
-/// The corners of a box about the centres of all cubes that any of the tests
-/// can return, in the camera's own frame: across, up, depth.
+/// Corners of a box around the centres of all cubes that any test can return.
+///
+/// In the camera's own frame: across, up, depth.
 fn region(ratio: f64) -> [DVec3; 2] {
     let radius = ratio * 3f64.sqrt() / 2.0;
-    // The sphere test returns the most: centres within the frustum whose
-    // planes are all moved outward by the radius. That is a truncated pyramid
-    // from near - radius to far + radius.
+    // The sphere test returns the most: centres within the frustum whose planes are all moved
+    // outward by the radius. That is a truncated pyramid from near - radius to far + radius.
     let slope_y = libm::tan(FOVY_DEG.to_radians() / 2.0);
     let slope_x = slope_y * ASPECT;
     let far = 1.0 + radius;
@@ -286,14 +293,14 @@ fn region(ratio: f64) -> [DVec3; 2] {
     [DVec3::new(-x, -y, NEAR - radius), DVec3::new(x, y, far)]
 }
 
-/// The cube with this centre in the camera's own frame.
+/// Cube with this centre in the camera's own frame.
 fn cube_at(camera: &Camera, ratio: f64, at: DVec3) -> Aabb {
     let frame = &camera.frame;
     let centre = frame.u() * at.x + frame.v() * at.y - frame.n() * at.z;
     Aabb::around(centre.as_vec3(), Vec3::splat((ratio / 2.0) as f32))
 }
 
-/// Cubes whose centres are strewn evenly over the region.
+/// Cubes whose centres are spread evenly over the region.
 fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     let [low, high] = region(ratio);
     let cell = (high - low) / GRID as f64;
@@ -329,7 +336,7 @@ mod tests {
                 let Some(errors) = row.errors else { continue };
                 let lost = errors.false_negatives + errors.touch_dropped;
                 assert!(!is_safe || lost == 0, "{row:?}");
-                // There is something to lose, and something to return too much.
+                // There are items to lose, and items to return in excess.
                 let visible = 101..4 * BOXES as u64;
                 assert!(visible.contains(&errors.visible), "{name} {row:?}");
             }
@@ -352,14 +359,14 @@ mod tests {
         assert_eq!(lost(of(&rows, 1e7, "f64", "frame")), 0);
     }
 
-    /// The errors of every test of sizes.
+    /// Errors of every test of the size sweep.
     fn of_cubes(camera: &Camera, cubes: &[Aabb]) -> Vec<ErrorCount> {
         let mut tests = unjudged(Sweep::Size);
         judge(camera, cubes, &Surroundings::default(), &mut tests);
         tests.iter().map(|test| test.errors[0]).collect()
     }
 
-    /// Cubes beside the region would have to be counted if any test returned them.
+    /// Cubes outside the region need not be counted, as no test returns them.
     #[test]
     fn nothing_beside_the_region_is_returned_by_any_test() {
         let mut rng = SeededRng::new(5);
@@ -382,8 +389,8 @@ mod tests {
                 for beside in of_cubes(&camera, &cubes) {
                     assert_eq!(beside, ErrorCount::default(), "{ratio}");
                 }
-                // The other way round: cubes within are seen, and the f64 test
-                // with all planes makes no mistake.
+                // Conversely, cubes inside are visible, and the f64 test with all planes makes no
+                // error.
                 let within = of_cubes(&camera, &strewn(&mut rng, &camera, ratio));
                 let [spheres, .., exact] = &within[..] else {
                     panic!("{within:?}")
@@ -396,8 +403,9 @@ mod tests {
         }
     }
 
-    /// Other frusta and other cubes: as far from each other as the sampling
-    /// errors say, also the rare ones.
+    /// Other frusta and other cubes: results differ as much as their sampling errors.
+    ///
+    /// This includes the rare errors.
     #[test]
     fn seeds_agree_within_their_sampling_errors() {
         let sweeps: Vec<Vec<SweepRow>> = (1..5).map(|seed| sweep(Sweep::Size, 24, seed)).collect();
