@@ -218,7 +218,7 @@ fn along(y: State, h: f64, slope: State) -> State {
 
 /// Most iterations of a stage: one that needs more has no solution nearby.
 const MOST_ITERATIONS: u32 = 20;
-/// Change below which the iteration stops.
+/// Change, relative to 1 + |y|, below which the iteration stops.
 const NEGLIGIBLE: f64 = 1e-14;
 
 impl Arm {

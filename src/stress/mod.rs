@@ -1,6 +1,7 @@
-//! The stiff and extreme suite: test vectors and generated extremes.
+//! Stress suite: test vectors and generated extremes.
 //!
-//! On every structure, at planes and at camera level. This file defines the rows that come out.
+//! Runs on every structure, at planes and at camera level. This file defines the rows of the
+//! result.
 
 pub mod extremes;
 mod replay;
@@ -15,11 +16,11 @@ pub use vectors::{Name, Vector, VectorBox, VectorCamera, VectorPoint, built_in, 
 pub(crate) use vectors::{Names, read_vectors_file};
 
 named! {
-    /// Numbers that are taken to be exact.
+    /// Numbers that count as exact.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Level {
-        /// The f32 planes; the camera plays no part.
+        /// The f32 planes; the camera is not used.
         Planes = "planes",
         /// The camera's f64 numbers; planes are rounded.
         Camera = "camera",
@@ -34,7 +35,7 @@ pub enum Status {
     Pass,
     /// Another outcome.
     Fail,
-    /// Impossible, and refused as it must be.
+    /// Impossible, and refused as required.
     Refused,
 }
 
@@ -44,7 +45,7 @@ impl Status {
     }
 }
 
-/// Names of boxes, or words.
+/// Content of an answer: names of boxes, or words.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Said {
@@ -78,9 +79,9 @@ impl std::fmt::Display for Said {
 /// One check: a case on a structure with a culling test.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Row {
-    /// A case, or a case and the box that went wrong.
+    /// Id of the case, with the name of the faulty box if there is one.
     pub id: String,
-    /// Numbers that were taken to be exact.
+    /// Numbers that count as exact.
     pub level: Level,
     /// Name of the structure.
     pub structure: String,
@@ -97,7 +98,7 @@ pub struct Row {
     pub kernel: Option<&'static str>,
 }
 
-/// Checks that belong together: a category of vectors, a family of extremes.
+/// Group of checks: a category of vectors, or a family of extremes.
 #[derive(Clone, Default, Debug)]
 pub struct Section {
     /// Category or family.
@@ -108,7 +109,7 @@ pub struct Section {
     pub boxes: u64,
     /// Verdicts of the oracle (extremes at camera level).
     pub tally: extremes::Tally,
-    /// Checks with their outcome.
+    /// Checks with their outcomes.
     pub rows: Vec<Row>,
 }
 

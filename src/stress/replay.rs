@@ -1,7 +1,7 @@
-//! Test vectors on structures.
+//! Checks of test vectors on structures.
 //!
-//! The given planes bit for bit, the camera through the default pipeline, points, and boxes
-//! that must be refused.
+//! The given planes bit for bit, the camera through the default pipeline, points, and boxes that
+//! must be refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,20 +25,20 @@ pub fn replay(vector: &Vector, structures: &[StructureSpec]) -> Vec<Row> {
     .vector(vector)
 }
 
-/// Structures and planes that vectors are checked with.
+/// Structures and planes for checking vectors.
 ///
-/// Without the default planes (an epsilon of zero, say) failures are expected: tests of
-/// the suite use it.
+/// With other planes than the default (an epsilon of zero, say) failures are expected: tests of the
+/// suite use this.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
-    /// Structures that are queried.
+    /// Structures under test.
     pub structures: &'a [StructureSpec],
     /// Derivation of the planes of cameras.
     pub planes: PlaneOptions,
 }
 
 impl Replay<'_> {
-    /// All rows of a vector: O(structures * tests) of them.
+    /// Checks a vector; returns O(structures * tests) rows.
     pub fn vector(&self, vector: &Vector) -> Vec<Row> {
         let sound = vector.sound_boxes().map(|b| (b.id.clone(), b.bounds()));
         let (names, items): (Vec<Name>, Vec<Aabb>) = sound.unzip();
@@ -79,8 +79,10 @@ impl Replay<'_> {
         specs.map(|s| (s.label.as_str(), build(s))).collect()
     }
 
-    /// Builds that must fail: each rejected box among some sound ones, and the
-    /// first of them among all boxes.
+    /// Checks builds that must fail.
+    ///
+    /// Each rejected box is built among some sound ones, and the first non-finite one among all
+    /// boxes.
     fn rejected(&self, sheet: &mut Sheet) {
         let vector = sheet.vector;
         let all: Vec<Aabb> = vector.boxes().map(VectorBox::bounds).collect();
@@ -118,7 +120,7 @@ impl Replay<'_> {
         let sound = camera.as_ref().ok();
         let sound = sound.filter(|_| vector.camera_error().is_none());
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
-        // The oracle decides what is visible if the file does not say it.
+        // The oracle decides what is visible if the file does not state it.
         let truth = oracle.as_ref().map(|oracle| sheet.seen_by(oracle));
         let listed = &vector.expected_visible_camera;
         let wanted = listed.clone().or(truth).unwrap_or_default();
@@ -149,7 +151,7 @@ impl Replay<'_> {
             };
             let exact = oracle.as_ref().zip(sound);
             let exact = exact.filter(|_| test == CullingTest::Exact);
-            // More than is wanted may come; of the exact test, only within its margin.
+            // Extra boxes are allowed; for the exact test, only within its margin.
             let fault = |b: &Aabb, is_wanted: bool| match (exact, is_wanted) {
                 (None, true) => Some("dropped".to_owned()),
                 (None, false) => None,
@@ -174,10 +176,10 @@ impl Replay<'_> {
     }
 }
 
-/// Sound boxes beside one that must be rejected.
+/// Number of sound boxes around one that must be rejected.
 const BESIDE: usize = 64;
 
-/// Adds rows of what a file says about its own planes and empty boxes.
+/// Adds rows for a file's claims about its own planes and empty boxes.
 fn claims(sheet: &mut Sheet) {
     let vector = sheet.vector;
     let mut row = |about: &Name, expected: Said, got: Said| {
@@ -212,7 +214,7 @@ fn claims(sheet: &mut Sheet) {
     }
 }
 
-/// Message of a build that must refuse this item, or what happened instead.
+/// Returns the message of a build that must refuse this item, or the wrong outcome.
 fn refused(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Result<String, String> {
     match built {
         Err(error @ BuildError::NonFiniteItem { item, .. }) if item == wanted => {
@@ -223,7 +225,7 @@ fn refused(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Resul
     }
 }
 
-/// Returns the volume if it exists and should, else adds a row for each structure.
+/// Returns the volume if it exists and should; else adds a row per structure.
 ///
 /// `declared` is the declared refusal, `otherwise` the expected outcome without one.
 fn accepted<V>(
@@ -265,7 +267,7 @@ fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: 
         sheet.compared([structure, test], &wanted, &answer, explain);
     }
     let (six, exact) = (CullingTest::SixPlane, &vector.p_vertex_exact_visible);
-    // Exact sums are of finite numbers.
+    // Exact sums require finite numbers.
     if exact.is_some() {
         sheet.seen(six, exact, sheet.names_of(|b| sees_exactly(&volume, b)));
     }
@@ -275,8 +277,10 @@ fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: 
     sheet.verdicts(&Oracle::of_volume(&volume), visible, touch);
 }
 
-/// Region search. Boxes are f32, so that a point of f64 may find too many of them:
-/// only those that hold the point as written count.
+/// Checks point location.
+///
+/// The query is rounded to f32, so it may find too many boxes for an f64 point: only those that
+/// contain the point as written count.
 fn points(sheet: &mut Sheet, built: &[Built]) {
     let vector = sheet.vector;
     for (structure, built) in built {

@@ -1,6 +1,6 @@
 //! Rows of one vector at one level: answers as sets of names.
 //!
-//! Also the margin of the planes of the exact test, for vectors and extremes.
+//! Also computes the margin of the exact test's planes, for vectors and extremes.
 
 use std::collections::BTreeMap;
 
@@ -17,16 +17,16 @@ use crate::query::{AnyVolume, QueryCost};
 
 /// Distance outside the camera's volume up to which the exact test returns a box.
 ///
-/// A plane of unit length is rounded (u of `|d|` and of each `|n_k| x_k`),
-/// moved by c = 8 times u of `sum |n_k| A_k + |d|`, and evaluated with at most
-/// 4 roundings of the magnitudes at the box's corner. `|d|` is no more than the
-/// magnitudes there and what the box is outside by, and A_k no more than the scene's
-/// reach: 26 u of the larger of that and of the box's own reach, and 32 covers it
-/// whatever the depths of near and far are. Below f32 altogether is 2^-140 at
-/// most. An eye far away from all that it sees costs 2^-49 of its coordinates, by the
-/// derivation in f64 and by the margin for it; for planes that are sums of others four
-/// times that is allowed. A view so wide that its sides are all but parallel leaves
-/// f64 no digits for its bounds; what the exact test then returns is not judged.
+/// A plane of unit length is rounded (u of `|d|` and of each `|n_k| x_k`), moved by c = 8 times u
+/// of `sum |n_k| A_k + |d|`, and evaluated with at most 4 roundings of the magnitudes at the box's
+/// corner. `|d|` is at most the magnitudes there plus the distance by which the box is outside; A_k
+/// is at most the scene's reach. Together this is 26 u of the larger of that reach and of the box's
+/// own; 32 covers it for all depths of near and far. Underflow in f32 adds at most 2^-140 in total.
+///
+/// An eye far away from everything it sees costs 2^-49 of its coordinates, by the derivation in f64
+/// and by the margin for it; planes that are sums of others are allowed four times that. A view so
+/// wide that its sides are nearly parallel leaves f64 no digits for its bounds; its margin is
+/// infinite, so that nothing is checked.
 pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 140) << 52);
@@ -35,7 +35,7 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     if openness(&camera.lens) < CANCELLED {
         return f64::INFINITY;
     }
-    // A scene without extent has the volume's.
+    // A scene without extent gets the reach of the volume.
     let mut reach = around.reach.as_dvec3();
     if let (DVec3::ZERO, Some(corners)) = (reach, camera.lens.corners(&camera.frame)) {
         let away = corners.map(|corner| (corner - around.origin).abs());
@@ -47,10 +47,11 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     32.0 * UNIT_ROUNDOFF * size + DERIVED * far_away + TINY
 }
 
-/// The determinant of near's, a side's and the bottom's or top's normals: what
-/// is left when the three make a bound along an axis.
+/// Determinant of the normals of near, a side, and the bottom or top.
+///
+/// Its size is what remains when these three planes make a bound along an axis.
 fn openness(lens: &Lens) -> f64 {
-    // Matrices are not drawn here.
+    // Matrix cameras are not generated here.
     if lens.is_orthographic() || lens.matrix().is_some() {
         return 1.0;
     }
@@ -59,10 +60,10 @@ fn openness(lens: &Lens) -> f64 {
     slopes.map(|s| 1.0 / libm::hypot(1.0, s)).iter().product()
 }
 
-/// The six-plane test without any rounding.
+/// Six-plane test without any rounding.
 pub fn sees_exactly(volume: &ConvexVolume, b: &Aabb) -> bool {
     let excludes = |plane: &Plane| {
-        // f64 holds the products.
+        // f64 holds the products exactly.
         let products = plane.normal.as_dvec3() * plane.p_vertex(b).as_dvec3();
         let mut value = Expansion::from(plane.d);
         for product in products.to_array() {
@@ -73,7 +74,7 @@ pub fn sees_exactly(volume: &ConvexVolume, b: &Aabb) -> bool {
     !b.is_empty() && !volume.planes().iter().any(excludes)
 }
 
-/// The six-plane test in f32 with fused sums, from the offset to z, y and x.
+/// Six-plane test in f32 with fused sums, from the offset to z, y and x.
 pub fn sees_fused(volume: &ConvexVolume, b: &Aabb) -> bool {
     let excludes = |plane: &Plane| {
         let (n, x) = (plane.normal, plane.p_vertex(b));
@@ -82,16 +83,16 @@ pub fn sees_fused(volume: &ConvexVolume, b: &Aabb) -> bool {
     !b.is_empty() && !volume.planes().iter().any(excludes)
 }
 
-/// Name of the oracle's own rows in place of a structure.
+/// Name of the oracle's own rows in the column of structures.
 pub const ORACLE: &str = "oracle";
 
-/// A structure by its label, built over the boxes of a vector or refused.
+/// Label of a structure; its index over a vector's boxes, or its refusal.
 pub type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
 
-/// Names of the boxes that a query returned, sorted, or why there are none.
+/// Sorted names of the boxes that a query returned, or the reason for none.
 pub type Answer = Result<Vec<Name>, String>;
 
-/// One level of one vector.
+/// Results of one level of one vector.
 pub struct Sheet<'a> {
     pub vector: &'a Vector,
     pub level: Level,
@@ -125,7 +126,7 @@ impl Sheet<'_> {
         });
     }
 
-    /// Adds the row of an answer, which fails if it holds an empty box.
+    /// Adds the row of an answer; it fails if the answer has an empty box.
     pub fn answered(
         &mut self,
         about: Option<&Name>,
@@ -142,10 +143,10 @@ impl Sheet<'_> {
         self.row(about, subject, status, Said::of_names(wanted), got);
     }
 
-    /// Adds the row of an answer and a row for each box that is wrong in it.
+    /// Adds the row of an answer, and a row for each wrong box in it.
     ///
-    /// `fault` describes a difference: a box, and whether it is wanted; `None` if the
-    /// difference is allowed.
+    /// `fault` describes a difference: a box, and whether it is wanted; `None` if the difference is
+    /// allowed.
     pub fn compared(
         &mut self,
         subject: [&str; 2],
@@ -172,7 +173,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// Adds a row for each name in the lists of the level that no sound box has.
+    /// Adds a row for each name in the level's lists that no sound box has.
     pub fn unknown_names(&mut self) {
         let vector = self.vector;
         for name in vector.named(self.level) {
@@ -194,14 +195,14 @@ impl Sheet<'_> {
         those.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Names of the boxes that the oracle sees. Boxes that are not finite are none.
+    /// Names of the finite boxes that the oracle sees.
     pub fn seen_by(&self, oracle: &Oracle) -> Names {
         self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
     }
 
-    /// Queries a structure, counted and not.
+    /// Queries a structure, with counting and without.
     ///
-    /// Returned items that `keep` rejects are dropped; unknown ids show in the answer.
+    /// Drops returned items that `keep` rejects; unknown ids show in the answer.
     pub fn query(
         &self,
         built: &Result<Box<dyn DynIndex>, BuildError>,
@@ -236,7 +237,7 @@ impl Sheet<'_> {
         }
     }
 
-    /// Adds rows of the oracle's verdicts: visible and touching exactly as declared.
+    /// Adds rows that compare the oracle's verdicts with the lists of the file.
     pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
         let mut wrong = Vec::new();
         let boxes = self.names.iter().zip(self.items);
@@ -245,17 +246,18 @@ impl Sheet<'_> {
             let found = judgement.verdict;
             let lists = |list: &Option<Names>| list.as_ref().map(|names| names.contains(name));
             let wanted = match (lists(visible), lists(touch)) {
-                // A touch counts as visible: the two lists contradict each other.
+                // A touch counts as visible, so the two lists contradict each other.
                 (Some(false), Some(true)) if found == Verdict::Touch => Verdict::Out,
                 (_, Some(true)) => Verdict::Touch,
                 (Some(false), _) => Verdict::Out,
                 (Some(true), Some(false)) => Verdict::In,
-                // A file without one of the two lists accepts either.
+                // A file without one of the two lists accepts either verdict.
                 (Some(true), None) if found == Verdict::Out => Verdict::In,
                 (None, Some(false)) if found == Verdict::Touch => Verdict::In,
                 _ => found,
             };
-            // A view narrower than the oracle's numbers: what it calls a touch is visible.
+            // The view is narrower than the oracle's precision: an undecided touch counts as
+            // visible.
             let is_narrow = || self.vector.camera.is_some_and(|c| !c.is_carried());
             let is_visible = judgement.undecided && wanted != Verdict::Out && is_narrow();
             if found != wanted && !is_visible {

@@ -20,61 +20,61 @@ use crate::shown::{counted, plain};
 use crate::spec::nearest;
 use crate::stress::Level;
 
-/// The vectors that come with the program.
+/// Vectors that come with the program.
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 /// Name of the built-in vectors in messages.
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 
-/// The narrowest angle of view that the oracle of a camera carries, degrees.
+/// Narrowest angle of view that the camera oracle supports, degrees.
 const CARRIED_DEG: f64 = 1e-12;
 
-/// Derivations of planes, of which those in a file are the result.
+/// Derivations of planes from which those in a file may come.
 const METHODS: &str = "given frame_f32 gh_gl_f32 gh_gl_f32_raw gh_revz_f32";
 
-/// Names of boxes; sorted, so that they print alike every time.
+/// Names of boxes, sorted so that the output is deterministic.
 pub type Names = BTreeSet<Name>;
 
-/// One test vector. Fields that a file leaves out are not checked.
+/// One test vector; fields that a file leaves out are not checked.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Vector {
-    /// Unique in its file.
+    /// Id, unique in its file.
     pub id: Name,
     category: Option<Name>,
     plane_method: Option<Value>,
     normals: Option<Value>,
     semantics: Option<Value>,
     planes: Option<Vec<Array<Narrow, 4>>>,
-    /// Replaces `planes` where a file has both: the answers are about these bits.
+    /// Bit patterns that replace `planes` if a file has both.
     planes_f32_hex: Option<Vec<Array<Bits, 4>>>,
     /// Camera that the boxes are culled for.
     pub camera: Option<VectorCamera>,
     boxes: Option<Vec<VectorBox>>,
     points: Option<Vec<VectorPoint>>,
-    /// Boxes that reach into the volume of the planes or touch it.
+    /// Boxes that intersect or touch the volume of the planes.
     pub expected_visible_planes: Option<Names>,
-    /// Boxes that touch the volume of the planes and do not reach into it.
+    /// Boxes that only touch the volume of the planes.
     pub touch_planes: Option<Names>,
-    /// Boxes that reach into the camera's view or touch it.
+    /// Boxes that intersect or touch the camera's view.
     pub expected_visible_camera: Option<Names>,
-    /// Boxes that touch the camera's view and do not reach into it.
+    /// Boxes that only touch the camera's view.
     pub touch_camera: Option<Names>,
     /// Answer of the f32 six-plane test.
     pub observed_f32_pvertex_mul_add: Option<Names>,
-    /// The same where products and sums are fused.
+    /// Answer of the f32 six-plane test with fused products and sums.
     pub observed_f32_pvertex_fma: Option<Names>,
     /// Answer of the six-plane test without any rounding.
     pub p_vertex_exact_visible: Option<Names>,
     expect_camera_error: Option<Declared>,
     expect_planes_error: Option<Declared>,
-    /// Indices of the planes whose normal is zero, among those that are finite.
+    /// Indices of the planes with a zero normal, among the finite planes.
     pub degenerate_planes: Option<Names>,
-    /// Boxes that must be refused: a bound is not finite.
+    /// Boxes that must be refused because a bound is not finite.
     pub expect_rejected_at_load: Option<Names>,
-    /// Boxes that must never be returned: a lower bound is above its upper one.
+    /// Inverted boxes (a lower bound above its upper one), which no query may return.
     pub expect_empty_boxes: Option<Names>,
 }
 
-/// A camera as a file states it: it may be impossible.
+/// Camera as stated by a file, possibly impossible.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct VectorCamera {
     eye: Array<Number, 3>,
@@ -89,19 +89,19 @@ pub struct VectorCamera {
 /// A box by its name.
 #[derive(Clone, Debug, Deserialize)]
 pub struct VectorBox {
-    /// Unique in its vector.
+    /// Name, unique in its vector.
     pub id: Name,
     lo: Array<Narrow, 3>,
     hi: Array<Narrow, 3>,
 }
 
-/// A point and the boxes that hold it.
+/// A point and the boxes that contain it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct VectorPoint {
     /// Name of the point.
     pub id: Name,
     p: Array<Number, 3>,
-    /// Names of the boxes that hold it, bounds included.
+    /// Names of the boxes that contain it, bounds included.
     pub expected_containing: Names,
 }
 
@@ -115,15 +115,15 @@ impl VectorCamera {
         }
     }
 
-    /// Returns whether the oracle carries the angles of the lens without loss.
+    /// Returns `true` if the oracle represents the angles of the lens without loss.
     pub fn is_carried(&self) -> bool {
         self.fovy_deg.0 * self.aspect.0.min(1.0) >= CARRIED_DEG
     }
 
-    /// The camera of these numbers.
+    /// Camera with these numbers.
     ///
     /// # Errors
-    /// No such camera.
+    /// There is no such camera.
     pub fn camera(&self) -> Result<Camera, CameraError> {
         let far = self.far.map(|far| far.0);
         let far = far.filter(|far| *far != f64::INFINITY);
@@ -134,7 +134,7 @@ impl VectorCamera {
 }
 
 impl VectorBox {
-    /// The box itself; its bounds may be inverted or not finite.
+    /// Box as stated; its bounds may be inverted or not finite.
     pub fn bounds(&self) -> Aabb {
         let corner = |row: Array<Narrow, 3>| Vec3::from(row.0.map(|x| x.0));
         Aabb::new(corner(self.lo), corner(self.hi))
@@ -142,7 +142,7 @@ impl VectorBox {
 }
 
 impl VectorPoint {
-    /// The point in scene coordinates, as written.
+    /// Point in scene coordinates, as written.
     pub fn p(&self) -> DVec3 {
         vector(self.p)
     }
@@ -159,7 +159,7 @@ impl Vector {
         self.boxes.as_deref().unwrap_or_default().iter()
     }
 
-    /// Boxes that a scene may hold: none that is rejected at load.
+    /// Boxes that a scene may contain: those not rejected at load.
     pub fn sound_boxes(&self) -> impl Iterator<Item = &VectorBox> {
         let rejected = self.expect_rejected_at_load.as_ref();
         self.boxes()
@@ -181,9 +181,9 @@ impl Vector {
         Some(rows.map(|row| plane(row.0.map(|x| x.0))).collect())
     }
 
-    /// Claims of the vector that no check can judge, in words.
+    /// Claims of the vector that no check covers, in words.
     ///
-    /// A list without names is no claim. Planes that must be refused may have names: the
+    /// A list without names makes no claim. Planes that must be refused may have names: the
     /// format's generator lists what the finite ones among them leave visible.
     fn unjudged(&self) -> impl Iterator<Item = &'static str> {
         let seen = !self.named(Level::Camera).is_empty();
@@ -251,12 +251,12 @@ fn vector(row: Array<Number, 3>) -> DVec3 {
 /// Reads the built-in vectors.
 ///
 /// # Errors
-/// None, unless the file in the source was broken; a test reads it.
+/// None, unless the file in the source is broken; a test reads it.
 pub fn built_in() -> Result<Vec<Vector>> {
     read_vectors(BUILT_IN.as_bytes(), BUILT_IN_NAME)
 }
 
-/// [`read_vectors`] from a file on disk.
+/// Reads a file of vectors from disk, as [`read_vectors`] does.
 ///
 /// # Errors
 /// A file that cannot be read, or is wrong.
@@ -267,9 +267,9 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>> {
 
 /// Reads a file of vectors: an object with the array `vectors`, or the array alone.
 ///
-/// Numbers may be given as the words NaN, Infinity (inf) and -Infinity (-inf); unknown
-/// fields are ignored, with a note where one is like a known or a camera has it, and so are
-/// claims that nothing can judge.
+/// Numbers may be given as the words NaN, Infinity (inf) and -Infinity (-inf). Ignores unknown
+/// fields, with a note if one resembles a known field or belongs to a camera, and claims that no
+/// check covers.
 ///
 /// # Errors
 /// One line: the file, the path of the field, what was found and expected.
@@ -298,7 +298,7 @@ fn list(bytes: &[u8]) -> Result<Vec<Vector>, JsonError> {
     }
 }
 
-/// Tells of each kind of claim that is not judged, once.
+/// Prints a note for each kind of claim that is not checked, once.
 fn note_unjudged(vectors: &[Vector], file: &str) {
     let mut told = BTreeSet::new();
     for (n, vector) in vectors.iter().enumerate() {
@@ -308,7 +308,7 @@ fn note_unjudged(vectors: &[Vector], file: &str) {
     }
 }
 
-/// Collects the fields of objects, each below the field that holds the object.
+/// Collects the fields of objects, each with the field that holds the object.
 fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
     match value {
         Value::Array(list) => list.iter().for_each(|value| fields(holder, value, found)),
@@ -320,9 +320,10 @@ fn fields(holder: &str, value: &Value, found: &mut BTreeSet<[String; 2]>) {
     }
 }
 
-/// Tells of a wrong count, and of fields that the format does not have.
+/// Prints notes on a wrong count and on fields that the format does not have.
 ///
-/// Those that are nearly one of it, and all of a camera: they may change its view.
+/// Only on `normals` and `semantics`, fields that resemble a known one, and all fields of a camera:
+/// those may change its view.
 fn note_unknown(bytes: &[u8], file: &str, vectors: usize) {
     let value = |bytes| from_json(bytes).unwrap_or(Value::Null);
     let all = |value: &Value| {
@@ -352,10 +353,10 @@ fn note_unknown(bytes: &[u8], file: &str, vectors: usize) {
     }
 }
 
-/// Objects with fields of the format; others have names of boxes.
+/// Objects with fields of the format; the keys of others are names of boxes.
 const HOLDERS: [&str; 5] = ["file", "vectors", "camera", "boxes", "points"];
 
-/// Refuses an id that occurred before in a list.
+/// Rejects an id that occurs twice in a list.
 fn unique<'v>(file: &str, list: &str, ids: impl Iterator<Item = &'v Name>) -> Result<()> {
     let mut seen = BTreeSet::new();
     ids.enumerate().try_for_each(|(n, id)| {
@@ -374,24 +375,25 @@ struct File {
     vectors: Vec<Vector>,
 }
 
-/// Name of a box or a vector: text, or a whole number taken as text.
+/// Name of a box or a vector: text, or an integer read as text.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Name(pub String);
 
-/// A number of f64, or a word for one that JSON does not have.
+/// An f64, or a word for a value that JSON does not have.
 #[derive(Clone, Copy, Debug)]
 struct Number(f64);
 
-/// A number of f32, exactly or in the fewest decimals that read back as it: the
-/// answers beside it are about this very number. Beyond its range it is infinite.
+/// An f32, exact or in the fewest decimals that round-trip.
+///
+/// The expected answers are about this very number; it is infinite beyond f32's range.
 #[derive(Clone, Copy, Debug)]
 struct Narrow(f32);
 
-/// The bits of an f32 in hexadecimal: "0x3f800000".
+/// Bits of an f32 in hexadecimal: "0x3f800000".
 #[derive(Clone, Copy, Debug)]
 struct Bits(f32);
 
-/// The error that is expected, in words; `false` is none.
+/// Expected error, in words; `false` means none.
 #[derive(Clone, Debug)]
 struct Declared(Option<String>);
 
@@ -412,7 +414,7 @@ impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for Array<T, N> 
     }
 }
 
-/// Reads one of the types above from each kind of JSON value that it may have.
+/// Implements reading of one type above from each JSON kind that it may have.
 macro_rules! written_as {
     ($Type:ident, $expected:literal, $($visit:ident($From:ty, $Kind:ident) $read:expr;)+) => {
         impl<'de> Deserialize<'de> for $Type {
@@ -474,7 +476,7 @@ fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
 }
 
 fn word(text: &str) -> Option<f64> {
-    // A number in quotes is none.
+    // Words only: a number in quotes is rejected.
     let is_word = text.chars().all(|c| c == '-' || c.is_ascii_alphabetic());
     text.parse().ok().filter(|_| is_word)
 }

@@ -1,7 +1,7 @@
-//! The cameras of the generated extremes, and the boxes about them.
+//! Cameras of the generated extremes, and the boxes around them.
 //!
-//! One family per way in which a camera or its boxes can be extreme. A row of the table is a
-//! family; its variants say how far it goes.
+//! Each family is extreme in one way; its variants are its parameters. A row of the table is a
+//! family.
 
 use glam::{DVec3, Vec3};
 
@@ -11,33 +11,33 @@ use crate::kernel::each;
 use crate::oracle::Pose;
 use crate::scene::SeededRng;
 
-/// Shapes of the boxes of a case.
+/// Distribution of the boxes' shapes in a case.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub enum Shapes {
     /// Points, cubes, slivers, specks and boxes larger than the volume.
     #[default]
     Mixed,
-    /// Lines and plates: zero on one or two axes, long on the others.
+    /// Lines and plates: zero size on one or two axes, long on the others.
     Needles,
-    /// A few boxes, many times each.
+    /// A few boxes, each many times.
     Coincident,
-    /// Sizes over six orders of magnitude side by side.
+    /// Sizes over six orders of magnitude next to each other.
     Ratio,
-    /// Bounds on a grid of integers that the camera is on as well.
+    /// Bounds on the integer grid that the camera is on too.
     Grid,
 }
 
-/// The hull of what a camera sees, in scene-local f64.
+/// Convex hull of a camera's view, in scene-local f64.
 struct Hull {
     /// Near corners, then far ones; bit 0 is right, bit 1 top.
     corners: [DVec3; 8],
-    /// Inward normals, in the order of the corners' bits.
+    /// Inward normals: left, right, bottom, top, near, far.
     ///
-    /// Left, right, bottom, top, near, far.
+    /// The order matches the corners' bits.
     normals: [DVec3; 6],
 }
 
-/// Depth up to which an infinite volume is probed / near.
+/// Depth / near up to which an infinite volume is probed.
 const DEEP: f64 = 1e4;
 
 impl Hull {
@@ -47,7 +47,7 @@ impl Hull {
         let lens = camera.lens.with_far(Some(far)).ok()?;
         let frame = camera.frame.relative_to(around.origin);
         let camera = Camera { lens, ..*camera };
-        // Only as a hint where inside is.
+        // Only the normals' directions are needed.
         let planes = camera.convex_volume_f64(around).ok()?;
         let normals: Vec<DVec3> = planes.planes().iter().map(|p| p.normal).collect();
         Some(Hull {
@@ -65,9 +65,9 @@ impl Hull {
     }
 }
 
-/// `count` boxes about a camera's volume, in scene-local coordinates.
+/// Generates `count` boxes around a camera's volume, in scene-local coordinates.
 ///
-/// One in 64 is inverted, and so empty. None if the lens has no corners.
+/// One in 64 is inverted, and so empty. `None` if the lens has no corners.
 pub fn adversarial(
     rng: &mut SeededRng,
     camera: &Camera,
@@ -94,9 +94,9 @@ pub fn adversarial(
     Some(boxes)
 }
 
-/// A box whose corner, edge or face meets the hull where it was aimed.
+/// A box whose corner, edge or face touches a random point of the hull.
 fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
-    // Anywhere between near and far, every order of magnitude alike.
+    // Between near and far, uniform in the logarithm of the depth.
     let depth = libm::exp2(-rng.between(0.0, 14.0));
     let mut at = [rng.unit(), rng.unit(), depth];
     let mut faces: Vec<DVec3> = Vec::with_capacity(3);
@@ -110,12 +110,12 @@ fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
     let (mut inward, mut both) = (faces.iter().sum::<DVec3>(), [false; 3]);
     let axis = rng.below(3);
     match faces[..] {
-        // An edge against an edge of the box along this axis.
+        // An edge of the hull against the box's edge along this axis.
         [a, b, ..] if a[axis] * b[axis] < 0.0 && rng.below(2) == 0 => {
             inward = a * b[axis].abs() + b * a[axis].abs();
             both[axis] = true;
         }
-        // A corner against a face of the box across this axis.
+        // A corner of the hull against the box's face perpendicular to this axis.
         [_, _, _] if rng.below(2) == 0 => {
             both = [0, 1, 2].map(|k| k != axis);
         }
@@ -144,11 +144,12 @@ fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
     Aabb::new(min.clamp(-limit, limit), max.clamp(-limit, limit))
 }
 
-/// A box well inside, beside, behind or before the volume: a plane that is
-/// missing or far off shows here.
+/// A box well inside the volume, beside, behind or before it.
+///
+/// Reveals a plane that is missing or far off.
 fn astray(rng: &mut SeededRng, hull: &Hull) -> Aabb {
     let (s, t) = (rng.between(-0.5, 1.5), rng.between(-0.5, 1.5));
-    // The size of near against the depth of the volume.
+    // Size of the near face relative to the depth of the volume.
     let near = (hull.corners[0] - hull.corners[3]).length();
     let far = (hull.corners[4] - hull.corners[7]).length();
     let before = (near / (far - near).max(near)).min(1.0);
@@ -165,7 +166,7 @@ fn astray(rng: &mut SeededRng, hull: &Hull) -> Aabb {
     Aabb::new(low.as_vec3(), high.as_vec3())
 }
 
-/// Edge lengths for a volume that is `scale` wide where the box is.
+/// Edge lengths, for a volume that is `scale` wide at the box.
 fn sizes(rng: &mut SeededRng, shapes: Shapes, scale: f64) -> [f64; 3] {
     let edge = scale * libm::exp2(rng.between(-6.0, 0.0));
     match shapes {
@@ -183,24 +184,24 @@ fn sizes(rng: &mut SeededRng, shapes: Shapes, scale: f64) -> [f64; 3] {
     }
 }
 
-/// The number `ulps` representable numbers above `x`, or below.
+/// Steps `ulps` representable numbers up from `x`, or down if negative.
 fn shifted(x: f32, ulps: i32) -> f32 {
     (0..ulps.abs()).fold(x, |x, _| if ulps > 0 { x.next_up() } else { x.next_down() })
 }
 
-/// One way of being extreme.
+/// A family of extreme cameras.
 pub struct CameraFamily {
     /// Name in the table of results.
     pub name: &'static str,
     /// Parameters of the family, mildest first.
     pub variants: &'static [f64],
-    /// Name of a variant in ids.
+    /// Name of a variant, used in ids.
     pub label: fn(f64) -> String,
-    /// Makes an ordinary camera one of the family, for a parameter.
+    /// Changes an ordinary camera into one of the family, given the parameter.
     adjust: fn(&mut Draft, &mut SeededRng, f64),
 }
 
-/// Distances from zero.
+/// Distances from the origin.
 const OFFSETS: &[f64] = &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15];
 
 /// Far / near.
@@ -210,7 +211,7 @@ const RATIOS: &[f64] = &[1e3, 1e6, 1e9, f64::INFINITY];
 pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, variants, label, adjust }
     // Far / near from 1e3 to 1e9, and infinite.
     "near-far", RATIOS, plain, |draft, _, ratio| draft.depth(ratio);
-    // The same with planes from a reversed-Z matrix in f64.
+    // As near-far, with planes from a reversed-Z matrix in f64.
     "reversed-z", RATIOS, plain, |draft, _, ratio| {
         draft.depth(ratio);
         draft.planes.method = PlaneMethod::GhRevzF64;
@@ -220,9 +221,9 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, varia
         |draft, _, fov| draft.fovy_deg = fov;
     // Width / height from 1e-8 to 1e8.
     "aspect", &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8], plain, |draft, _, aspect| draft.aspect = aspect;
-    // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
+    // A camera 1e4 to 1e15 times its depth away from the scene's origin.
     "offset", OFFSETS, plain, |draft, rng, offset| draft.carry_off(rng, offset);
-    // The same in coordinates about a point near the camera.
+    // As offset, in coordinates relative to a point near the camera.
     "rebased", OFFSETS, plain, |draft, rng, offset| {
         draft.carry_off(rng, offset);
         draft.origin = draft.eye.round();
@@ -231,8 +232,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, varia
     "condition", &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15], plain, |draft, rng, angle| {
         draft.until_it_has_a_frame(rng, |draft, rng| {
             draft.to_look = rng.below(2) == 0;
-            // Along the view as f64 has it, and hardly away from it: rounding can bring
-            // one camera's up too near to the view whatever its length is.
+            // Close to the view direction as f64 has it: rounding can bring one camera's up vector
+            // too close to the view, whatever its length.
             let length = libm::exp2(rng.between(-4.0, 4.0));
             let away = angle * draft.forward.length() / draft.up.length();
             let across = draft.up * away * rng.between(0.9, 1.5);
@@ -247,7 +248,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, varia
             draft.forward *= 4.0 * share * size / draft.forward.length();
         });
     };
-    // A volume about zero, seen from 1e3 to 1e15 depths away.
+    // A volume around zero, seen from 1e3 to 1e15 depths away.
     "shell", &[1e3, 1e6, 1e9, 1e12, 1e15], plain, |draft, _, distance| {
         let half = draft.far.unwrap_or(1.0) / 2.0;
         let distance = distance * half;
@@ -260,11 +261,11 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, varia
         |power| format!("2^{power}"), |draft, _, power| draft.scale(libm::exp2(power));
     // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
     "size-ratio", &[1e6], plain, |draft, _, _| draft.shapes = Shapes::Ratio;
-    // Sixteen boxes, over and over.
+    // Sixteen boxes, repeated.
     "coincident", &[16.0], plain, |draft, _, _| draft.shapes = Shapes::Coincident;
     // Lines, plates and points without thickness.
     "needles", &[64.0], plain, |draft, _, _| draft.shapes = Shapes::Needles;
-    // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
+    // A 90-degree camera on an integer grid with its boxes: exact ties and one-ulp shifts.
     "ties", &[8.0, 64.0, 4096.0], plain, |draft, rng, far| {
         draft.shapes = Shapes::Grid;
         draft.eye = draft.eye.round();
@@ -290,7 +291,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, varia
 };
 
 impl CameraFamily {
-    /// Draws a camera for a parameter.
+    /// Generates a camera for a parameter.
     pub fn draft(&self, rng: &mut SeededRng, variant: f64) -> Draft {
         let mut draft = Draft::any(rng);
         (self.adjust)(&mut draft, rng, variant);
@@ -306,7 +307,7 @@ fn plain(value: f64) -> String {
     }
 }
 
-/// A camera that is still being described, as exact numbers.
+/// Camera under construction, as exact numbers.
 #[derive(Default)]
 pub struct Draft {
     eye: DVec3,
@@ -316,21 +317,22 @@ pub struct Draft {
     aspect: f64,
     near: f64,
     far: Option<f64>,
-    /// True if the pose names a point to look at.
+    /// True if the pose specifies a point to look at.
     to_look: bool,
-    /// Replaces the perspective lens.
+    /// Lens to use instead of the perspective one.
     other_lens: Option<Result<Lens, CameraError>>,
-    /// Scene-local zero in world coordinates.
+    /// Scene-local origin in world coordinates.
     pub origin: DVec3,
     /// Derivation of its planes.
     pub planes: PlaneOptions,
-    /// Shapes of the boxes about it.
+    /// Shapes of the boxes around it.
     pub shapes: Shapes,
 }
 
 impl Draft {
-    /// Ordinary in every way: some 10 deep, within some 10 of zero; along an
-    /// axis one time in four.
+    /// An ordinary camera: depth around 10, within some 10 of the origin.
+    ///
+    /// Looks along an axis one time in four.
     fn any(rng: &mut SeededRng) -> Draft {
         let (forward, up) = loop {
             let (mut forward, up) = (rng.normal3(), rng.normal3());
@@ -354,7 +356,7 @@ impl Draft {
         }
     }
 
-    /// Adjusts one ordinary camera after another until its vectors make a frame.
+    /// Redraws and adjusts ordinary cameras until the vectors make a frame.
     fn until_it_has_a_frame(
         &mut self,
         rng: &mut SeededRng,
@@ -367,7 +369,7 @@ impl Draft {
         }
     }
 
-    /// Moves the eye into some corner of space.
+    /// Moves the eye by `offset` on each axis, in a random octant.
     fn carry_off(&mut self, rng: &mut SeededRng, offset: f64) {
         self.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
     }
@@ -380,7 +382,7 @@ impl Draft {
     }
 
     fn scale(&mut self, factor: f64) {
-        // A far plane beyond the farthest would be an infinite one.
+        // A far plane beyond `FARTHEST` would count as infinite.
         let factor = self.far.map_or(factor, |far| factor.min(FARTHEST / far));
         self.eye *= factor;
         self.near *= factor;
@@ -400,7 +402,7 @@ impl Draft {
         }
     }
 
-    /// The lens, or why there is none.
+    /// The lens, or the reason why there is none.
     pub fn lens(&self) -> Result<Lens, CameraError> {
         let other = self.other_lens.clone();
         other.unwrap_or_else(|| Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far))

@@ -1,6 +1,6 @@
-//! One generated case under test, its faults, and what counts as one.
+//! Checks of one generated case, and the faults they find.
 //!
-//! Every structure and culling test on the boxes of a case, against the scalar loop and the
+//! Compares every structure and culling test on the boxes of a case with the scalar loop and the
 //! oracle.
 
 use glam::DVec3;
@@ -15,21 +15,21 @@ use crate::stress::Said;
 use crate::stress::sheet::slack;
 use crate::verify::{self, ErrorCount, Trial, Truth, scan};
 
-/// Name of the scalar loop in place of a structure.
+/// Name of the scalar loop in the column of structures.
 pub const SCALAR: &str = "scalar";
 
 /// Sums over cases.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Tally {
-    /// Boxes judged at camera level.
+    /// Boxes with a verdict at camera level.
     pub boxes: u64,
-    /// Boxes that touch, to all that is known.
+    /// Boxes that touch the volume or are too close to decide.
     pub ties: u64,
-    /// Visible boxes, and those that answers with a margin lost.
+    /// Visible boxes, and those that tests with a margin lost.
     pub errors: ErrorCount,
     /// Views that were refused because their sums could overflow.
     pub refused: u64,
-    /// Boxes that the six planes would lose without their epsilon.
+    /// Boxes that the six-plane test would lose without its epsilon.
     pub lost_bare: u64,
 }
 
@@ -43,22 +43,22 @@ impl std::ops::AddAssign for Tally {
     }
 }
 
-/// A wrong answer, or none.
+/// A wrong answer, or a missing one.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fault {
     /// Structure and test.
     pub subject: [String; 2],
-    /// Index of the box; `None` where the whole answer is wrong.
+    /// Index of the box; `None` if the whole answer is wrong.
     pub item: Option<usize>,
-    /// The right answer.
+    /// Expected answer.
     pub expected: Said,
-    /// The answer that was found.
+    /// Actual answer.
     pub got: String,
-    /// The box and the truth about it, so that a reader can check by hand.
+    /// Description of the box and its truth, so that a reader can check by hand.
     pub about: Option<String>,
 }
 
-/// Structures by their labels, built over the boxes of a case.
+/// Structures with their labels, built over the boxes of a case.
 pub type Built<'s> = Vec<(&'s str, Box<dyn DynIndex>)>;
 
 /// Checks of one case and their faults.
@@ -68,26 +68,26 @@ pub struct Findings {
     pub boxes: u64,
     /// Verdicts of the oracle at camera level.
     pub tally: Tally,
-    /// Structure and test of every check.
+    /// Structure and test of each check.
     pub checked: Vec<[String; 2]>,
-    /// Faults in the order in which they were found.
+    /// Faults in the order found.
     pub faults: Vec<Fault>,
 }
 
 impl Findings {
-    /// A camera that should have been made, for a reason.
+    /// Findings for a camera that could not be made, with the reason.
     pub fn without_case(reason: String) -> Findings {
         let mut found = Findings::default();
         found.fault([SCALAR, "camera"], None, "a camera with boxes", reason);
         found
     }
 
-    /// Notes a check of a structure, or of the scalar loop, by a test.
+    /// Records a check of a structure, or of the scalar loop, by a test.
     pub fn check(&mut self, subject: [&str; 2]) {
         self.checked.push(subject.map(str::to_owned));
     }
 
-    /// Notes a wrong answer.
+    /// Records a fault.
     pub fn fault(
         &mut self,
         subject: [&str; 2],
@@ -104,7 +104,7 @@ impl Findings {
         });
     }
 
-    /// Builds all structures. A build that fails is a fault.
+    /// Builds all structures; a failed build is a fault.
     pub fn built<'s>(&mut self, structures: &'s [StructureSpec], input: Input<'_>) -> Built<'s> {
         let mut built = Vec::with_capacity(structures.len());
         for spec in structures {
@@ -116,7 +116,7 @@ impl Findings {
         built
     }
 
-    /// Compares every structure with the scalar loop over its items.
+    /// Compares every structure with the scalar loop over the same items.
     pub fn compare(&mut self, built: &Built, test: &str, volume: AnyVolume<'_>, items: &[Aabb]) {
         let mut trial = Trial::new(items.len());
         trial.see(items, volume);
@@ -145,11 +145,11 @@ impl Findings {
 
 /// A camera with boxes and the truth about them.
 pub struct Case {
-    /// The camera that is culled for.
+    /// Camera of the view.
     pub camera: Camera,
     /// Derivation of its planes.
     pub planes: PlaneOptions,
-    /// Size of the scene about it, for the epsilon.
+    /// Extent of the scene around it, for the epsilon.
     pub around: Surroundings,
     /// Boxes to be culled, in scene coordinates.
     pub items: Vec<Aabb>,
@@ -157,7 +157,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Judges every box. O(items). None if the pose makes no camera.
+    /// Computes the truth about each box. O(items). `None` if the pose has no frame.
     pub fn new(
         camera: Camera,
         planes: PlaneOptions,
@@ -174,7 +174,7 @@ impl Case {
         })
     }
 
-    /// The errors of a test that sees these items.
+    /// Errors of a test that returns these items.
     pub fn errors(&self, seen: &[ItemId]) -> ErrorCount {
         self.truth.errors(&self.items, seen)
     }
@@ -226,7 +226,7 @@ impl Case {
         found.described(|item| self.describe(item))
     }
 
-    /// Tests for a declared refusal: a view whose sums could overflow.
+    /// Returns true for a permitted refusal: a view whose sums could overflow.
     fn may_refuse(&self, error: &CullingError) -> bool {
         match error {
             CullingError::Camera(CameraError::Sums { .. }) => true,
@@ -235,8 +235,10 @@ impl Case {
         }
     }
 
-    /// The boxes lie within ulps of these planes, not of the moved ones: here
-    /// structures that round otherwise show.
+    /// Checks the tests without epsilon.
+    ///
+    /// The boxes lie within ulps of these planes, so structures that round differently are revealed
+    /// here.
     fn check_without_epsilon(
         &self,
         built: &Built,
@@ -258,7 +260,7 @@ impl Case {
         let Ok(sphere) = view(CullingTest::Sphere) else {
             return;
         };
-        // A sphere holds its box: what the box test sees it must see too.
+        // A sphere contains its box: it must be visible if the box is.
         let subject = [SCALAR, "sphere epsilon 0"];
         found.check(subject);
         let mut seen = seen.into_iter().map(|id| id as usize);
@@ -269,7 +271,7 @@ impl Case {
         }
     }
 
-    /// Checks the losses of the scalar loop.
+    /// Checks which items the scalar loop loses.
     fn scalar(&self, culling: &Culling, name: &str, seen: &[ItemId], found: &mut Findings) {
         found.check([SCALAR, name]);
         let errors = self.errors(seen);
@@ -277,8 +279,8 @@ impl Case {
         let ghosts = seen.iter().filter(is_ghost).count();
         let allowed = self.size() * F64_MARGIN;
         let (lost, expected) = match culling.arithmetic {
-            // Without a margin f64 is as good as its own roundings. Planes that
-            // are sums of others have lost digits; they are measured, not judged.
+            // Without a margin, f64 is only as accurate as its own rounding. Planes that are sums
+            // of others have lost digits; they are measured, not checked.
             Arithmetic::F64 => {
                 let judged = culling.test == CullingTest::SixPlane;
                 let text = format!("nothing dropped that is deeper than {allowed:e}");
@@ -308,7 +310,7 @@ impl Case {
         }
     }
 
-    /// The exact test returns nothing that is out by more than its margin.
+    /// Checks that the exact test returns nothing that is out by more than its margin.
     fn tight(&self, name: &str, seen: &[ItemId], found: &mut Findings) {
         let mut out = self.truth.answered(seen).filter_map(|(i, verdict, seen)| {
             let b = &self.items[i];
@@ -323,8 +325,7 @@ impl Case {
         }
     }
 
-    /// The magnitudes that f64 rounds: the eye's and the volume's coordinates
-    /// and those of the boxes.
+    /// Magnitude that f64 rounds: the coordinates of eye, volume and boxes.
     fn size(&self) -> f64 {
         let eye = self.camera.frame.eye;
         let own = (eye.abs() + (eye - self.around.origin).abs()).element_sum();
@@ -332,7 +333,7 @@ impl Case {
         own + depth + self.around.reach.as_dvec3().element_sum()
     }
 
-    /// The box and the truth about it, so that a reader can check by hand.
+    /// Describes the box and its truth, so that a reader can check by hand.
     pub fn describe(&self, item: usize) -> String {
         let b = &self.items[item];
         format!(
@@ -347,10 +348,10 @@ impl Case {
     }
 }
 
-/// Error of a plane test in f64, as a share of the magnitudes: a normal of unit
-/// length is true to a few units of 2^-53 in each component, the offset is a dot
-/// product of it with the eye, and the test itself rounds seven times. 2^-48 is twice
-/// all of that.
+/// Error of a plane test in f64, relative to the magnitudes.
+///
+/// A normal of unit length is accurate to a few units of 2^-53 in each component, the offset is a
+/// dot product of it with the eye, and the test itself rounds seven times. 2^-48 is twice the sum.
 const F64_MARGIN: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Planes of volumes this large may not fit f32.

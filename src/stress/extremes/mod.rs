@@ -1,6 +1,6 @@
 //! Generated extremes: families of seeded cases, and the loop that runs them.
 //!
-//! Each case declares its outcome.
+//! Each case declares its expected outcome.
 
 mod cameras;
 mod check;
@@ -22,32 +22,32 @@ pub(crate) use check::SCALAR;
 pub use check::{Case, Fault, Findings, Tally};
 pub use volumes::{PLANES_FAMILIES, PlanesFamily};
 
-/// Cases of each variant that make ten million boxes at camera level.
+/// Cases per variant for ten million boxes at camera level.
 pub const DEFAULT_CASES: u64 = 66;
 
-/// Number of extremes to generate.
+/// Parameters of a run of generated extremes.
 #[derive(Clone, Copy)]
 pub struct Extremes<'a> {
-    /// Structures that are queried.
+    /// Structures under test.
     pub structures: &'a [StructureSpec],
     /// Seed of the first case of each variant.
     pub seed: u64,
-    /// Cases of each variant.
+    /// Cases per variant.
     pub cases: u64,
-    /// Cases worked on at once.
+    /// Number of cases run concurrently.
     pub threads: usize,
 }
 
 /// Boxes of one case.
 pub const BOXES: usize = 2048;
-/// Structures are built over all boxes in one case of `ALL_EVERY`, else over `FEW`.
+/// One case in `ALL_EVERY` builds structures over all boxes, the others over `FEW`.
 const ALL_EVERY: u64 = 16;
 const FEW: usize = 256;
 
-/// Called with the family before each case; true leaves out the remaining cases.
+/// Called with the family before each case; returns true to skip the rest.
 pub type Progress<'a> = &'a (dyn Fn(&str) -> bool + Sync);
 
-/// Number of cases in all, for a progress bar.
+/// Total number of cases, for a progress bar.
 pub fn total(cases: u64) -> u64 {
     let variants: usize = CAMERA_FAMILIES.iter().map(|f| f.variants.len()).sum();
     let at_planes: u64 = PLANES_FAMILIES.iter().map(|f| f.factor).sum();
@@ -55,7 +55,7 @@ pub fn total(cases: u64) -> u64 {
 }
 
 impl Extremes<'_> {
-    /// All families, a section each.
+    /// Runs all families; returns one section per family.
     pub fn run(&self, progress: Progress) -> Vec<Section> {
         let (planes, cameras) = (PLANES_FAMILIES.iter(), CAMERA_FAMILIES.iter());
         let planes = planes.map(|family| self.planes_family(family, progress));
@@ -95,9 +95,9 @@ impl Extremes<'_> {
         section
     }
 
-    /// Runs cases of a family by their number and seed on all threads.
+    /// Runs cases of a family by number and seed on all threads.
     ///
-    /// Adds a row for each fault with its seed, in the order of the seeds, and one for each
+    /// Adds a row for each fault with its seed, in the order of the seeds, and one row for each
     /// structure and test of a group without a fault.
     fn add_cases(
         &self,
@@ -159,12 +159,12 @@ impl Extremes<'_> {
     }
 }
 
-/// The case of a family's variant and seed; the same on every machine.
+/// Case of a family's variant and seed; the same on every machine.
 ///
 /// # Errors
 /// A camera that cannot be made, in words.
 pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Case, String> {
-    // Each seed means another camera in every variant.
+    // A seed gives another camera in every variant.
     let name = family.name.bytes().chain(variant.to_bits().to_le_bytes());
     let words = name.fold(seed, |hash, byte| {
         hash.rotate_left(9).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(byte)
@@ -196,7 +196,7 @@ mod tests {
         assert!(variants as u64 * BOXES as u64 * DEFAULT_CASES >= 10_000_000);
     }
 
-    /// A draw that is refused must not be drawn again from numbers that stay.
+    /// A refused draw must be followed by a draw from different random numbers.
     #[test]
     fn every_seed_draws_a_camera() {
         for family in CAMERA_FAMILIES {
@@ -234,12 +234,12 @@ mod tests {
             let failed = section.rows.iter().find(|row| row.status == Status::Fail);
             assert!(failed.is_none(), "{failed:?}");
         }
-        // Otherwise the boxes were too easy and the zeros above mean nothing.
+        // Otherwise the boxes are too easy and the zeros above are meaningless.
         let cameras = &sections[PLANES_FAMILIES.len()..];
         let mut off = Vec::new();
         for section in cameras {
             let (boxes, seen) = (section.tally.boxes, section.tally.errors.visible);
-            // At 1e15 from zero f32 has few places left between in and out.
+            // At 1e15 from the origin f32 leaves few positions between in and out.
             let least = match section.name.ends_with("offset") {
                 true => boxes / 6,
                 false => boxes / 5,

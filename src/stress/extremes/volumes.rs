@@ -1,7 +1,7 @@
 //! Extremes at planes level.
 //!
-//! Volumes without an end, with many planes and with no point at all; inverted, flat and
-//! coincident boxes; and numbers so small that flushing them to zero would change the answer.
+//! Unbounded volumes, volumes with many planes and empty ones; inverted, flat and coincident boxes;
+//! and numbers so small that flushing them to zero would change the answer.
 
 use glam::Vec3;
 
@@ -16,29 +16,30 @@ use crate::scene::SeededRng;
 use crate::stress::sheet::sees_exactly;
 use crate::verify::{RandomCase, explain_visibility};
 
-/// A way to make cases at planes level.
+/// A family of cases at planes level.
 pub struct PlanesFamily {
     /// Name in the table of results.
     pub name: &'static str,
-    /// Makes the case of a seed.
+    /// Generates the case of a seed.
     pub case: fn(u64) -> RandomCase,
-    /// Cases for each case of a camera variant.
+    /// Number of cases per case of a camera variant.
     pub factor: u64,
-    /// Every operation of the plane test is exact: so must its answer be.
+    /// True if every operation of the plane test is exact; then its answer must be too.
     pub exact: bool,
 }
 
 /// All families at planes level, in the order of the table of results.
 pub static PLANES_FAMILIES: &[PlanesFamily] = rows! { PlanesFamily { name, factor, exact, case }
-    // Every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted and
-    // touching boxes.
+    // Every kind of volume (unbounded, empty, up to 31 planes), with flat, inverted and touching
+    // boxes.
     "volumes", 20, false, RandomCase::new;
     // Planes and boxes of denormal numbers: nothing may be flushed to zero.
     "denormals", 2, true, denormals;
 };
 
-/// Normals of -1, 0 and 1, offsets and bounds of whole multiples of the least
-/// number: no operation rounds, and all of them work on denormals.
+/// Case of denormal numbers on which no operation rounds.
+///
+/// Normals are -1, 0 and 1; offsets and bounds are integer multiples of the least number.
 fn denormals(seed: u64) -> RandomCase {
     let mut rng = SeededRng::new(seed ^ 0xDE_0A11);
     // Below the least normal number, 2^23 units.
@@ -71,11 +72,11 @@ fn denormals(seed: u64) -> RandomCase {
 
 /// Kind of a volume of a few planes.
 const UNBOUNDED: usize = 5;
-/// The largest volume whose certificates are worth making: O(m^4).
+/// Most planes of a volume for which the oracle is affordable: O(m^4).
 const MOST_PLANES: usize = 12;
 
 impl PlanesFamily {
-    /// Checks every kind of volume of the planes, and the point, on every structure.
+    /// Checks every structure with every kind of view of the planes, and the point.
     pub fn check(&self, case: &RandomCase, structures: &[StructureSpec]) -> Findings {
         let mut found = Findings {
             boxes: case.items.len() as u64,
@@ -84,7 +85,7 @@ impl PlanesFamily {
         self.scalar(case, &mut found);
         let wide = ConvexVolumeF64::from(&case.volume);
         let spheres = Spheres::new(&case.volume);
-        // Offsets about the point may be beyond f32.
+        // Offsets relative to the point may overflow f32.
         let relative = RelativeVolume::about(case.point, &case.volume).ok();
         let cubes: Vec<Aabb> = case.items.iter().map(sphere_cube).collect();
         let (items, input) = (&case.items, Input::new(&cubes).spheres(true));
@@ -106,9 +107,11 @@ impl PlanesFamily {
         found.described(|item| explain_visibility(&case.items[item], &case.volume))
     }
 
-    /// The scalar loop against the oracle: without an epsilon it may drop what
-    /// is no deeper than the roundings of the test itself, and it must never
-    /// return what is wholly outside one plane by more.
+    /// Compares the scalar loop with the oracle.
+    ///
+    /// Without an epsilon it may drop only boxes that are no deeper than the rounding of the test
+    /// itself, and it must not return an empty box. In an exact family it must give the answer
+    /// without any rounding. Skips volumes of more than [`MOST_PLANES`] planes.
     fn scalar(&self, case: &RandomCase, found: &mut Findings) {
         let subject = [SCALAR, "six-plane"];
         found.check(subject);
@@ -137,9 +140,9 @@ impl PlanesFamily {
     }
 }
 
-/// Error of evaluating a plane at the box, for unit length: 3
-/// roundings of each product, one of the sum with d; 4 u of the magnitudes
-/// and what underflows.
+/// Error of evaluating a plane at the box, divided by the normal's length.
+///
+/// 3 roundings of each product, one of the sum with d: 4 u of the magnitudes, and underflow.
 fn roundings(volume: &ConvexVolume, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 147) << 52);

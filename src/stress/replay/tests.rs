@@ -1,4 +1,4 @@
-//! Claims of vectors that hold, and that do not.
+//! Claims of vectors that hold, and claims that do not.
 
 use super::*;
 use crate::index::Registry;
@@ -54,7 +54,7 @@ fn a_touch_that_is_declared_of_a_box_outside_fails() {
     for vector in built_in().unwrap() {
         let camera = vector.camera.is_none_or(|camera| camera.camera().is_ok());
         if vector.planes_error().is_some() || !camera {
-            // Without a volume nothing is judged.
+            // Without a volume no list can be checked.
             continue;
         }
         let names: Vec<Name> = vector.sound_boxes().map(|b| b.id.clone()).collect();
@@ -75,7 +75,7 @@ fn a_touch_that_is_declared_of_a_box_outside_fails() {
             touch.insert(name.clone());
             let wrong = format!("{}/{}", vector.id.0, name.0);
             assert!(failed(&vector).contains(&wrong), "{wrong}");
-            // A list of touches is a claim without one of what is visible.
+            // A list of touches is a claim even without a list of visible boxes.
             (
                 vector.expected_visible_planes,
                 vector.expected_visible_camera,
@@ -105,7 +105,7 @@ fn a_touch_that_is_declared_and_not_visible_fails() {
     };
     assert!(wedge(r#"["b"]"#).is_empty());
     assert_eq!(wedge("[]"), ["v", "v/b"]);
-    // The row of what is visible is not about touches.
+    // The row of visible boxes does not depend on touches.
     let touches = |list: &str| {
         failed(&format!(
             r#"[{{"id":"v","planes":[[1,0,0,0]],"boxes":[{{"id":"b","lo":[-1,0,0],
@@ -126,7 +126,7 @@ fn boxes_that_are_declared_empty_are_inverted() {
     );
 }
 
-/// The planes of `planes_f32_hex`, and one that is no constraint.
+/// Planes of `planes_f32_hex`, one of which is no constraint.
 #[test]
 fn claims_about_planes_and_names_are_judged() {
     let fails = |claims: &str| {

@@ -1,4 +1,4 @@
-//! Vectors as they are read and answered.
+//! Reading of vectors, and the answers to them.
 
 use std::sync::Mutex;
 
@@ -119,7 +119,7 @@ fn every_mistake_is_one_line_that_says_where() {
 
 static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Notes about a file with one vector or more, which is read.
+/// Notes on reading a file with one or more vectors.
 fn notes(file: &str, vectors: &str) -> Vec<String> {
     tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
     read_vectors(vectors.as_bytes(), file).unwrap();
@@ -177,7 +177,7 @@ fn claims_and_fields_that_are_not_judged_are_told() {
             r#""normals":"inward","semantics":"closed: box [lo,hi]""#,
             "",
         ),
-        // A list without names claims nothing.
+        // A list without names makes no claim.
         (
             r#""expected_visible_camera":[],"touch_camera":null,"touch_planes":[]"#,
             "",
