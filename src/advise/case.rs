@@ -1,4 +1,4 @@
-//! Scene, cameras and fastest tree that all rules read.
+//! Scene, cameras and fastest tree, the input of all rules.
 
 use anyhow::{Result, ensure};
 use glam::{DVec3, Vec3};
@@ -15,16 +15,16 @@ use crate::path::{CameraPath, evenly};
 use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
 
-/// Most verdicts of the oracle: some 50 ns each.
+/// Most verdicts of the oracle, which take some 50 ns each.
 const MOST_JUDGED: usize = 1_000_000;
 
 pub struct Case<'a> {
     pub workload: &'a Workload<'a>,
     pub path: &'a CameraPath,
-    /// The fastest tree.
+    /// Fastest tree or grid.
     pub spec: StructureSpec,
     pub index: Box<dyn DynIndex>,
-    /// The fastest scan.
+    /// Fastest scan.
     pub scan: StructureSpec,
 }
 
@@ -45,7 +45,7 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// Cameras of the path with the truth about them, evenly spread.
+    /// Cameras of the path with their truth, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
         let judged = spread(
             self.workload.scene.items.len(),
@@ -59,7 +59,7 @@ impl<'a> Case<'a> {
         truths.collect()
     }
 
-    /// The six-plane volumes of the path.
+    /// Six-plane volumes of the path.
     pub fn volumes(&self) -> impl Iterator<Item = &ConvexVolume> {
         self.workload.views.iter().filter_map(|view| match view {
             CameraView::Volume(volume) => Some(volume),
@@ -67,23 +67,23 @@ impl<'a> Case<'a> {
         })
     }
 
-    /// The views of the path by another culling.
+    /// Views of the path with another culling.
     pub fn views_by(&self, culling: &Culling) -> Result<Vec<CameraView>, CullingError> {
         let cameras = self.workload.cameras.iter();
         let view = |camera| culling.view(camera, &self.workload.around);
         cameras.map(view).collect()
     }
 
-    /// The tree over the items as a culling test indexes them.
+    /// Builds the fastest tree over the items as a culling test indexes them.
     pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
         let scene = self.workload.scene;
         let items = test.items(&scene.items);
         self.spec.build(input_for(test, scene, &items))
     }
 
-    /// The depth of a camera's view, at most that of the scene.
+    /// Depth of a camera's view, at most that of the scene.
     ///
-    /// The eye's distance for a scene that is a point, and not zero even there.
+    /// If the scene is a point, the eye's distance from it; never zero.
     fn depth(&self, camera: &Camera) -> f64 {
         let Scene { bounds, origin, .. } = self.workload.scene;
         let [low, high] = [bounds.min, bounds.max].map(Vec3::as_dvec3);
@@ -93,9 +93,9 @@ impl<'a> Case<'a> {
         depths.reduce(f64::min).unwrap_or(1.0)
     }
 
-    /// Outward displacement of planes for rounding about an origin, in depths.
+    /// Largest outward displacement of the planes for rounding, in view depths.
     ///
-    /// The largest of all cameras and planes, in depths of the view.
+    /// The maximum over all cameras and planes.
     pub fn margin(&self, around: &Surroundings) -> f64 {
         let options = PlaneOptions::default();
         let margins = self.workload.cameras.iter().filter_map(|camera| {
@@ -112,7 +112,7 @@ impl<'a> Case<'a> {
     }
 }
 
-/// Evenly spread boxes of a scene about another origin, rounded outward once more.
+/// Evenly spread boxes of a scene about another origin, rounded outward again.
 pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
     let boxes = evenly(scene.items.len(), count);
     let boxes = boxes.map(|id| WorldBox::of(&scene.items[id], scene.origin));
@@ -123,9 +123,9 @@ pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, Inpu
     })
 }
 
-/// Largest acceptable error: of planes in depths of the view, of a camera's axes.
+/// Largest acceptable error of planes (in view depths) and of a camera's axes.
 pub(super) const TOLERANCE: f64 = 1e-5;
-/// Reason for which rules about nodes do not apply.
+/// Reason why rules about nodes do not apply.
 pub(super) const NO_NODES: &str = "the structure taken has no nodes";
 
 /// Bytes per item of the structures and trees of all rules; 950 were measured.
@@ -136,16 +136,16 @@ const BYTES_PER_ITEM: u64 = 1000;
 pub struct AdviseInput<'a> {
     /// Scene, cameras, structures to choose from, rounds and times of a process.
     pub setting: &'a Setting,
-    /// Motion of the items, file or spec; `None` for a still scene.
+    /// Motion of the items, as a file or spec; `None` for a still scene.
     pub motion: Option<&'a str>,
-    /// Queries per frame.
+    /// Number of queries per frame.
     pub views: usize,
     /// Cost of drawing an item that is not visible, ns.
     pub draw_ns: f64,
 }
 
 impl<'a> AdviseInput<'a> {
-    /// The queries of the path.
+    /// Queries of the path.
     ///
     /// # Errors
     /// A path without cameras, an unfit motion.
@@ -164,10 +164,9 @@ impl<'a> AdviseInput<'a> {
     }
 }
 
-/// The structure that a plan names.
+/// Structure that a plan names by its label.
 ///
-/// One of the list, one under a policy of the advice's own (`wide@rebuild`), or one of this
-/// crate.
+/// From the list; else from the list with an added policy (`wide@rebuild`); else from this crate.
 pub(super) fn planned(structures: &[StructureSpec], label: &str) -> StructureSpec {
     let (alone, policy) = label.split_once('@').unwrap_or((label, ""));
     let named = |name: &str| structures.iter().find(|spec| spec.label == name).cloned();
@@ -181,11 +180,11 @@ pub(super) fn planned(structures: &[StructureSpec], label: &str) -> StructureSpe
     spec
 }
 
-/// Structures of the rules where the list has no tree, no scan.
+/// Structures used by the rules if the list has no tree or no scan.
 pub(super) const TREE: &str = "wide";
 pub(super) const SCAN: &str = "linear";
 
-/// A structure of this crate with its default parameters.
+/// Structure of this crate with its default parameters.
 pub(super) fn default_of(name: &'static str, execution: Execution) -> StructureSpec {
     let spec = StructureSpec::parse(name).expect("a name of this crate's own");
     spec.by(execution)

@@ -1,7 +1,7 @@
-//! Changes of the workload that the advice depends on.
+//! Changes of the workload on which the advice depends.
 //!
-//! The structures that are in question are measured on parts of the scene, with other
-//! shares of the items in view, and with other shares of movers, by the tasks of a run.
+//! Measures the contending structures on parts of the scene, with other shares of the items in
+//! view, and with other shares of moving items, by the tasks of a run.
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
@@ -15,49 +15,51 @@ use crate::measure::{
 };
 use crate::motion::Motion;
 
-/// Axis along which a workload is changed.
+/// Axis along which a workload is varied.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// Number of items: evenly spread parts of the scene.
     Items,
-    /// Share of the items in view: far and near planes scaled.
+    /// Share of the items in view: far and near planes are scaled.
     ShareInView,
-    /// Share of the items that move in a frame.
+    /// Share of the items that move per frame.
     ShareMoved,
 }
 
-/// Axes, each with the values that are measured beside that of the workload.
+/// Axes with the values that are measured in addition to the workload's.
 ///
-/// Numbers of items are parts of the whole.
+/// Numbers of items are shares of the whole.
 const AXES: [(Axis, [f64; 6]); 3] = [
     (Axis::Items, [4e-1, 1e-1, 2e-2, 4e-3, 1e-3, 2e-4]),
     (Axis::ShareInView, [0.001, 0.005, 0.02, 0.1, 0.4, 0.9]),
     (Axis::ShareMoved, [0.0001, 0.001, 0.01, 0.1, 0.4, 1.0]),
 ];
-/// The smallest part of a scene, items.
+/// Smallest part of a scene, in items.
 const LEAST: f64 = 32.0;
-/// Values nearer than this to that of the workload, as a ratio, are not measured.
+/// Least ratio of a measured value to that of the workload.
 const APART: f64 = 2.0;
 /// Most frames of a changed workload.
 const FRAMES: usize = 20;
 
-/// A structure that is faster from some value on.
+/// Value from which another structure is faster.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Turn {
-    /// The fastest structure there.
+    /// Fastest structure beyond it.
     pub structure: String,
-    /// Value on the axis at which both take the same time, between the two measured
-    /// values `lower` and `upper`: at one of them the structure taken is shown to be ahead,
-    /// at the other to be behind. The value of the workload where both tie there.
+    /// Value on the axis at which both structures take the same time.
+    ///
+    /// It lies between the measured values `lower` and `upper`: the chosen structure is
+    /// significantly faster at one of them and slower at the other. If both tie at the workload's
+    /// value, that value.
     pub at: f64,
-    /// Smaller of the two.
+    /// Smaller of the two values.
     pub lower: f64,
-    /// Larger of the two.
+    /// Larger of the two values.
     pub upper: f64,
 }
 
-/// Dependence of the structure to take on one axis.
+/// Dependence of the choice of structure on one axis.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Change {
     /// Number of items, share in view, or share moved.
@@ -66,41 +68,41 @@ pub struct Change {
     pub here: f64,
     /// Smallest and largest measured value.
     pub measured: [f64; 2],
-    /// Reason for which only the workload itself was measured; else null.
+    /// Reason why only the workload itself was measured; else null.
     pub not_varied: Option<String>,
     /// Turn below `here`; null if the advice holds down to the smallest value.
     pub below: Option<Turn>,
-    /// Turn above `here`; likewise.
+    /// Turn above `here`; null if the advice holds up to the largest value.
     pub above: Option<Turn>,
 }
 
-/// A workload of the axes.
+/// A workload varied along an axis.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Changed {
-    /// `None`: the workload itself.
+    /// `None` for the workload itself.
     axis: Option<Axis>,
-    /// Value on the axis, requested and reached.
+    /// Requested value on the axis; `reached` is the actual one.
     value: f64,
     reached: f64,
     known: Option<Known>,
 }
 
-/// Workloads to be measured beside the rules, the same for all processes.
+/// Workloads measured in addition to the rules, the same for all processes.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Beside {
-    /// Labels of the structures in question.
+    /// Labels of the contending structures.
     pub(super) contenders: Vec<String>,
-    /// Label of the structure taken that is rebuilt, on the workload itself.
+    /// Label of the chosen structure with rebuilds, for the workload itself.
     pub(super) rebuilt: Option<String>,
     /// Values of the workload itself; `None` on an axis that it does not have.
     here: [Option<f64>; 3],
-    /// Reasons for which values of each axis were not measured.
+    /// Reasons why values of each axis were not measured.
     refused: [Option<String>; 3],
     changed: Vec<Changed>,
 }
 
 impl Beside {
-    /// Plans the workloads; returns the results of the count pass, too.
+    /// Plans the workloads; also returns the results of the count pass.
     pub(super) fn plan(
         input: &AdviseInput,
         (contenders, rebuilt): (Vec<String>, Option<String>),
@@ -115,7 +117,7 @@ impl Beside {
         };
         let is_choice = beside.contenders.len() > 1;
         let mut wanted = vec![(None, 0.0); usize::from(beside.rebuilt.is_some() || is_choice)];
-        // A choice needs two.
+        // A choice needs two contenders.
         let axes = AXES.into_iter().zip(here);
         for ((axis, values), here) in axes.filter(|_| is_choice) {
             let Some(here) = here else { continue };
@@ -135,7 +137,7 @@ impl Beside {
                 reached: value,
                 known: None,
             };
-            // No such workload: a share that the cameras do not reach, a recorded motion.
+            // No such workload: the cameras do not reach the share, or the motion is recorded.
             match (changed.measured(input, &beside), axis) {
                 (Ok((reached, part)), _) => {
                     (changed.reached, changed.known) = (reached, part.known.clone());
@@ -149,7 +151,7 @@ impl Beside {
         (beside, parts)
     }
 
-    /// Cells of the workload without a change, of the structures in question alone.
+    /// Cells of the unchanged workload, for the contending structures only.
     pub(super) fn here<'g>(&self, groups: &'g [Group]) -> Option<&'g [ReportCell]> {
         let first = self.changed.first().zip(groups.first());
         first.and_then(|(own, group)| own.axis.is_none().then_some(&group.cells[..]))
@@ -164,7 +166,7 @@ impl Beside {
         parts.collect()
     }
 
-    /// The group of each workload, from the count pass and all processes.
+    /// Group of each workload, from the count pass and all processes.
     pub(super) fn groups(&self, counted: Vec<Part>, processes: &[ProcessTimes]) -> Vec<Group> {
         let groups = counted.into_iter().enumerate().map(|(n, counted)| {
             let timed = processes.iter().filter_map(|times| times.parts.get(n));
@@ -174,7 +176,7 @@ impl Beside {
         groups.collect()
     }
 
-    /// The dependence on each axis that the workload has.
+    /// Dependence of the choice on each axis that the workload has.
     ///
     /// `here` are the cells of the workload itself.
     pub(super) fn changes(&self, here: &[ReportCell], groups: &[Group]) -> Vec<Change> {
@@ -202,7 +204,7 @@ impl Beside {
     }
 }
 
-/// The first of the points at which another structure is faster than the one taken.
+/// First of the points at which another structure is faster than the chosen one.
 fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
     (1..points.len()).find_map(|n| {
         let (value, there) = *points[n];
@@ -212,11 +214,12 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
         if is_longer(ratio_at(there)?) != Some(true) {
             return None;
         }
-        // The last at which the one taken is shown ahead; ties from the start have none.
+        // Last point at which the chosen one is significantly faster; none if the points tie from
+        // the start.
         let ratio = |at: usize| ratio_at(points[at].1);
         let ahead = (0..n).rfind(|&at| ratio(at).and_then(is_longer) == Some(false));
         let before = points[ahead.unwrap_or(0)].0;
-        // Between two values by the logarithms of value and ratio.
+        // Interpolates the logarithms of value and ratio.
         let ln = |at: usize| ratio(at).map_or(0.0, |ratio| ratio.value.ln());
         let last = ahead.and_then(|_| (0..n).rfind(|&at| ln(at) <= 0.0));
         let at = last.map_or(before, |at| {
@@ -234,7 +237,7 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
 }
 
 impl Changed {
-    /// Measures the workload: in the count pass alone if nothing is known.
+    /// Measures the workload; only counts if there is no count pass yet.
     ///
     /// # Errors
     /// There is no such workload.
@@ -295,7 +298,7 @@ mod tests {
     use super::*;
     use crate::measure::{GroupKey, PathInfo, Status};
 
-    /// Cells of structures with their times, ns; ten processes, each a little off.
+    /// Cells of structures with times in ns; ten processes, each slightly different.
     fn cells(times: &[(&str, f64)]) -> Vec<ReportCell> {
         let key = GroupKey::of("scene", "path", false, &Culling::default(), "");
         let cell = |&(structure, ns): &(&str, f64)| {
@@ -320,23 +323,23 @@ mod tests {
         let of = |tree: f64| cells(&[("wide", tree), ("linear", 100.0)]);
         let [here, tie, slower] = [of(50.0), of(103.0), of(200.0)];
         let found = |points: &[(f64, &[ReportCell])]| turn("wide", points.iter().collect());
-        // Half of the time at 400 items, twice the time at 100: equal at 200.
+        // Half the time at 400 items, twice the time at 100: equal at 200.
         let first = found(&[(400.0, &here), (100.0, &slower), (10.0, &of(900.0))]).unwrap();
         assert_eq!(
             (&first.structure[..], first.lower, first.upper),
             ("linear", 100.0, 400.0)
         );
         assert!((first.at / 200.0 - 1.0).abs() < 0.01, "{first:?}");
-        // A tie is no other advice: equal between it and where the tree is ahead.
+        // A tie changes no advice; the turn lies between it and where the tree is faster.
         assert_eq!(found(&[(400.0, &here), (100.0, &tie)]), None);
         let late = found(&[(400.0, &here), (100.0, &tie), (25.0, &slower)]).unwrap();
         assert_eq!((late.lower, late.upper), (25.0, 400.0));
         assert!(100.0 < late.at && late.at < 110.0, "{late:?}");
-        // A tie from the start, though ahead: nothing to draw a line from.
+        // A tie from the start, though slightly faster: there is no point to interpolate from.
         let near = of(99.0);
         let tied = found(&[(400.0, &near), (100.0, &slower)]).unwrap();
         assert_eq!((tied.at, tied.lower, tied.upper), (400.0, 100.0, 400.0));
-        // Behind from the start, which was no proof.
+        // Slower from the start, but not significantly.
         let early = found(&[(400.0, &tie), (100.0, &slower)]).unwrap();
         assert_eq!((early.at, early.lower), (400.0, 100.0));
         assert_eq!(found(&[(400.0, &here)]), None);

@@ -1,7 +1,4 @@
-//! The structure and the culling test to take.
-//!
-//! A structure is chosen by measured cells, a test by its time and the cost of drawing its
-//! false positives.
+//! Choice of structure (by measured cells), of culling test and of update policy.
 
 use serde::Serialize;
 
@@ -13,14 +10,14 @@ use crate::index::{BuildError, UpdatePolicy};
 use crate::measure::{OverProcesses, ReportCell};
 use crate::statistics::{Estimate, flat, rate_of, ratio};
 
-/// Which structure, and all that took part.
+/// Chosen structure, and all candidates.
 #[derive(Clone, Debug, Serialize)]
 pub struct StructureChoice {
-    /// The fastest that answered right, a scan if one ties with it; null if none did.
+    /// Fastest correct structure; of ties a single-threaded scan first; null if none.
     pub name: Option<String>,
-    /// Others that the processes do not tell from it.
+    /// Others that tie with it.
     pub ties: Vec<String>,
-    /// Cells as in a report, fastest first; what failed comes last.
+    /// Cells as in a report, fastest first; failures come last.
     pub rows: Vec<ReportCell>,
 }
 
@@ -30,10 +27,10 @@ pub fn ns(cell: &ReportCell) -> Option<f64> {
 }
 
 impl StructureChoice {
-    /// From what a run measures of all structures on one scene and path.
+    /// Chooses from the cells of a run with all structures on one scene and path.
     pub(super) fn of(cells: &[ReportCell]) -> StructureChoice {
         let mut rows = cells.to_vec();
-        // Wrong answers below: they have no rank.
+        // Wrong answers come last: they have no rank.
         rows.sort_by(|a, b| {
             let order = a.rank.is_none().cmp(&b.rank.is_none());
             order.then(or_last(ns(a)).total_cmp(&or_last(ns(b))))
@@ -48,25 +45,25 @@ impl StructureChoice {
         }
     }
 
-    /// The cell of the one to take.
+    /// Cell of the chosen structure.
     pub fn taken(&self) -> Option<&ReportCell> {
         let mut rows = self.rows.iter();
         rows.find(|row| self.name.as_ref() == Some(&row.structure))
     }
 
-    /// Returns `true` if the one to take is a scan.
+    /// Returns `true` if the chosen structure is a scan.
     pub fn is_scan(&self) -> bool {
         self.taken().is_some_and(ReportCell::scans)
     }
 
-    /// Returns `true` if a scan and a tree are among those that tie.
+    /// Returns `true` if a scan ties with a chosen tree, or a tree with a chosen scan.
     pub(super) fn is_scan_or_tree(&self) -> bool {
         let ties = |row: &ReportCell| self.ties.contains(&row.structure);
         let mut tied = alone(&self.rows).filter(|row| ties(row));
         tied.any(|row| row.scans() != self.is_scan())
     }
 
-    /// Adds the ties that show where the contenders are timed without the others.
+    /// Adds ties that appear only where the contenders are timed without the others.
     pub(super) fn add_ties(&mut self, contenders: &[String], alone: &[ReportCell]) {
         let Some(taken) = &self.name else { return };
         let own = |label: &&String| *label == taken || self.ties.contains(label);
@@ -79,12 +76,12 @@ impl StructureChoice {
         self.ties.extend(ties);
     }
 
-    /// The fastest tree or grid and the fastest scan.
+    /// Fastest tree or grid, and fastest scan.
     pub(super) fn tree_and_scan(&self) -> [Option<&ReportCell>; 2] {
         [false, true].map(|scans| alone(&self.rows).find(|row| row.scans() == scans))
     }
 
-    /// Their labels, for the rules: without any, `wide` and `linear`.
+    /// Labels of the two for the rules; `wide` and `linear` if missing.
     pub(super) fn tree_and_scan_labels(&self) -> [String; 2] {
         let [tree, scan] = self.tree_and_scan();
         let label = |own: Option<&ReportCell>, otherwise: &str| {
@@ -93,9 +90,9 @@ impl StructureChoice {
         [label(tree, TREE), label(scan, SCAN)]
     }
 
-    /// Labels of the structure that is taken and of those that may replace it.
+    /// Labels of the chosen structure and of those that may replace it elsewhere.
     ///
-    /// In another workload: the fastest tree and scan, of a motion the three fastest too.
+    /// These are the fastest tree and scan; with a motion the three fastest too.
     pub(super) fn contenders(&self, moves: bool) -> Vec<String> {
         let (most, of_kind) = (if moves { 3 } else { 1 }, self.tree_and_scan());
         let own = alone(&self.rows).enumerate();
@@ -106,7 +103,7 @@ impl StructureChoice {
     }
 }
 
-/// Rows with a rank on one thread.
+/// Ranked rows on one thread.
 fn alone(rows: &[ReportCell]) -> impl Iterator<Item = &ReportCell> {
     (rows.iter()).filter(|row| row.rank.is_some() && !is_shared(row))
 }
@@ -115,19 +112,19 @@ fn is_shared(row: &ReportCell) -> bool {
     row.params["threads"].as_u64() > Some(1)
 }
 
-/// Time of a structure / time of another one, of those that rank.
+/// Time of a structure / time of another one, by the metric that ranks them.
 pub(super) fn over(own: &ReportCell, other: &ReportCell) -> Option<Estimate> {
     let [own, other] = [own, other].map(|cell| cell.ln_ns(cell.ranked_by()));
     ratio(&other, &own, &other)
 }
 
-/// [`over`] of the labels of two cells.
+/// [`over`], by the labels of the two cells.
 pub(super) fn time_over(cells: &[ReportCell], own: &str, other: &str) -> Option<Estimate> {
     let cell = |label| cells.iter().find(|cell| cell.structure == label);
     over(cell(own)?, cell(other)?)
 }
 
-/// The fastest structure and those that tie with it.
+/// Fastest structure and those that tie with it.
 pub(super) fn fastest(cells: &[ReportCell]) -> Vec<&ReportCell> {
     // Wrong answers have no rank.
     let sound = |cell: &&ReportCell| cell.rank.is_some() && ns(cell).is_some();
@@ -146,21 +143,20 @@ fn or_last(time: Option<f64>) -> f64 {
     time.unwrap_or(f64::INFINITY)
 }
 
-/// Which culling test, and all that took part, on the fastest tree.
+/// Chosen culling test, and all candidates, on the fastest tree.
 #[derive(Clone, Debug, Serialize)]
 pub struct TestChoice {
-    /// The one with the least total, or the simplest of those that the processes
-    /// do not tell from it; null if nothing could be judged.
+    /// Simplest of the tests that tie with the least total; null if none is left.
     pub name: Option<&'static str>,
-    /// The others of those.
+    /// Others that tie with the least total.
     pub ties: Vec<&'static str>,
-    /// The structure that the tests were measured with.
+    /// Structure that the tests were measured with.
     pub structure: String,
-    /// Every culling test that took part.
+    /// All measured culling tests.
     pub rows: Vec<TestRow>,
 }
 
-/// A culling test as measured.
+/// Measurements of a culling test.
 #[derive(Clone, Debug, Serialize)]
 pub struct TestRow {
     /// Name of the test.
@@ -168,21 +164,20 @@ pub struct TestRow {
     /// CPU time per frustum query, ns.
     #[serde(flatten, serialize_with = "flat::query_ns")]
     pub query_ns: Option<Estimate>,
-    /// False positives / visible items, by judged camera.
+    /// False positives / visible items, by camera with a truth.
     pub excess: Option<Estimate>,
-    /// Visible items that were not returned, in millionths.
+    /// False negatives per million visible items.
     pub false_negative_ppm: Option<Estimate>,
-    /// Mean of the judged cameras.
+    /// Mean over the cameras with a truth.
     pub false_positives_per_query: Option<f64>,
-    /// A query and the drawing of what it lets through though it cannot be
-    /// seen.
+    /// Time of a query plus the cost of drawing its false positives.
     pub total_ns: Option<f64>,
     /// Index of its task.
     #[serde(skip)]
     task: usize,
 }
 
-/// Enters every culling test, except where a camera has no such view.
+/// Adds tasks for all culling tests, except if a camera has no such view.
 pub(super) fn enter_tests(trials: &mut Trials) -> Result<Vec<(CullingTest, usize)>, BuildError> {
     let mut entered = Vec::with_capacity(TESTS.len());
     for (test, ..) in TESTS {
@@ -230,9 +225,9 @@ impl TestChoice {
     }
 }
 
-/// The tests whose total the processes do not tell from the least, simplest first.
+/// Tests whose total ties with the least one, simplest first.
 ///
-/// One that misses anything is none of them.
+/// Tests with false negatives are excluded.
 fn near_the_least(rows: &[TestRow], times: &OverProcesses) -> Vec<&'static str> {
     let sound = rows.iter().filter(|row| {
         let misses = row.false_negative_ppm.is_some_and(|ppm| ppm.value != 0.0);
@@ -249,36 +244,34 @@ fn near_the_least(rows: &[TestRow], times: &OverProcesses) -> Vec<&'static str> 
     };
     let near = sound.filter(|row| row.test == least.test || is_longer(row) != Some(true));
     let mut near: Vec<&'static str> = near.map(|row| row.test).collect();
-    // Rows are by the number of planes, and the sphere test needs an index of its own.
+    // Rows are by number of planes; the sphere test needs an index of its own, so it comes last.
     near.sort_by_key(|name| *name == CullingTest::Sphere.name());
     near
 }
 
-/// Rebuilds are ruled out where the builds alone take this many times a frame.
+/// Rebuilding is ruled out if the builds alone take this many times a frame.
 const RULED_OUT: f64 = 1.5;
 
-/// The policy to update the structure by.
+/// Chosen update policy of the structure.
 #[derive(Clone, Default, Debug, Serialize)]
 pub struct MotionChoice {
-    /// The fastest policy of the structure that is taken; null without a structure.
+    /// Fastest policy of the chosen structure; null without a structure.
     pub policy: Option<String>,
-    /// Others that the processes do not tell from it.
+    /// Others that tie with it.
     pub policy_ties: Vec<String>,
     /// Measured policies of the structure, fastest first.
     pub policies: Vec<ReportCell>,
-    /// Policies that are not measured, each with its builds / a frame with refits.
-    ///
-    /// Both are from the same processes.
+    /// Unmeasured policies, each with its builds / a frame with refits, same processes.
     pub ruled_out: Vec<(String, f64)>,
-    /// `false` if the structure is built again in every frame.
+    /// `false` if the structure is rebuilt in every frame.
     #[serde(skip)]
     refits: bool,
 }
 
 impl MotionChoice {
-    /// The choice before it is made, and the label of the rebuilds to be measured.
+    /// Choice before its measurement, and the label of the rebuilds to measure.
     ///
-    /// Policies of `--update` are rows of the run instead.
+    /// No label if policies of `--update` are rows of the run.
     pub(super) fn begun(
         input: &AdviseInput,
         structure: &StructureChoice,
@@ -303,7 +296,7 @@ impl MotionChoice {
         (begun, rebuilt)
     }
 
-    /// Chooses among the cells of the structure that is taken, under several policies.
+    /// Chooses among the cells of the chosen structure under several policies.
     pub(super) fn chosen(self, structure: &StructureChoice, cells: &[ReportCell]) -> MotionChoice {
         let alone = |label: &str| label.split('@').next().map(str::to_owned);
         let taken = structure.name.as_deref().and_then(alone);
@@ -322,7 +315,7 @@ impl MotionChoice {
     }
 }
 
-/// The policy in a label, `wide@every=10`.
+/// Policy in a label, as in `wide@every=10`.
 pub fn policy_of(label: &str) -> &str {
     label.split_once('@').map_or("refit", |(_, policy)| policy)
 }
@@ -337,9 +330,9 @@ mod tests {
     use crate::measure::{Metric, ProcessTimes};
     use crate::statistics::{Estimate, rate_of};
 
-    /// The tests near the least, over processes that are each a little off.
+    /// Tests near the least total, over slightly different processes.
     ///
-    /// Each with its query, what is drawn, ns, and what is missed.
+    /// A test is its query time and its drawing, in ns, and its misses.
     fn near(tests: &[(&'static str, f64, f64, f64)], processes: usize) -> Vec<&'static str> {
         let off = |n: usize, test: &str| 0.97 + 0.01 * ((n * test.len()) % 7) as f64;
         let process = |n| ProcessTimes {
@@ -385,7 +378,7 @@ mod tests {
         assert_eq!(of(0.8, [0.7, 0.94]), Some(false));
         assert_eq!(of(1.2, [1.04, 1.3]), None);
         assert_eq!(of(1.0, [0.9, 1.1]), None);
-        // Told apart, and by less than another layout of memory makes.
+        // Significant, but by less than another memory layout makes.
         assert_eq!(of(1.03, [1.02, 1.04]), None);
         assert_eq!(of(1.01, [f64::NAN; 2]), Some(true));
     }
@@ -393,23 +386,23 @@ mod tests {
     #[test]
     fn the_simplest_test_of_those_not_told_apart_is_taken() {
         let dear = ("sphere", 900.0, 5000.0, 0.0);
-        // A tie, and the simplest is not the least.
+        // A tie, in which the simplest does not have the least total.
         let tie = [
             dear,
             ("six-plane", 99.9, 0.5, 0.0),
             ("exact", 100.0, 0.0, 0.0),
         ];
         assert_eq!(near(&tie, 10), ["six-plane", "exact"]);
-        // One process tells nothing apart: the least is taken.
+        // With one process nothing is significant: the least is chosen.
         assert_eq!(near(&tie, 1), ["exact"]);
-        // What is drawn counts.
+        // The cost of drawing counts.
         let clear = [
             dear,
             ("six-plane", 90.0, 500.0, 0.0),
             ("six-box", 100.0, 2.0, 0.0),
         ];
         assert_eq!(near(&clear, 10), ["six-box"]);
-        // What misses something is excluded.
+        // A test that misses something is excluded.
         assert_eq!(near(&[dear, ("six-plane", 1.0, 0.0, 1.0)], 10), ["sphere"]);
         assert!(near(&[], 10).is_empty());
     }
@@ -441,7 +434,7 @@ mod tests {
         assert_eq!(tie.ties, ["wide", "linear:threads=2"]);
         assert!(tie.is_scan() && tie.is_scan_or_tree());
         assert_eq!(tie.contenders(false), ["linear", "wide"]);
-        // A tie with the others left out is one too; a firm answer stays.
+        // A tie without the other structures counts too; a significant answer stays.
         let mut ahead = StructureChoice::of(&of(80.0));
         assert_eq!(
             (ahead.name.as_deref(), ahead.ties.len()),
@@ -465,7 +458,7 @@ mod tests {
         ];
         assert_eq!(choice.tree_and_scan_labels(), ["octree", "linear-scalar"]);
         assert_eq!(choice.contenders(false), ["linear-scalar", "octree"]);
-        // What chooses is a scan where it tested most items.
+        // A structure that selects its method is a scan where it tested most items.
         choice.rows.insert(0, structure("auto", "tree", 1));
         choice.rows[0].scene.total_count = 100;
         for (chose, tested, tree) in [
@@ -484,7 +477,7 @@ mod tests {
             row.metrics.insert("items_tested".to_owned(), tested);
             assert_eq!(choice.tree_and_scan_labels()[0], tree, "{chose:?}");
         }
-        // A plan names what was found, also what the list does not hold.
+        // A plan names what was chosen, even if the list does not contain it.
         let structures = Registry::builtin()
             .structures("octree,linear-scalar")
             .unwrap();

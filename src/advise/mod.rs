@@ -1,6 +1,6 @@
 //! Advice about a scene and a path, with its measurements.
 //!
-//! It names a structure, a culling test and the features to leave out.
+//! Names a structure, a culling test and the features to leave out.
 
 mod case;
 mod change;
@@ -34,32 +34,32 @@ use trials::{Answered, BASE, Trials};
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrialPlan {
-    /// The tree and the scan of the rules.
+    /// Tree and scan of the rules.
     structures: [String; 2],
     schedule: Schedule,
-    /// Answers by task and camera.
+    /// Expected answers by task and camera.
     expected: Vec<Vec<Answer>>,
     beside: Beside,
-    /// Times of the stages, if the scene and the cameras have such.
+    /// Plan of the stages, if the scene and the cameras allow it.
     stages: Option<FunnelPlan>,
 }
 
-/// Compared advice before its times.
+/// Advice whose answers are compared, but which is not timed.
 pub struct Prepared {
     /// Tasks and schedule for all processes.
     pub plan: TrialPlan,
     entered: Entered,
     answered: Answered,
-    /// Counts of the workloads beside.
+    /// Counts of the additional workloads.
     counted: Vec<Part>,
     structure: StructureChoice,
     motion: Option<MotionChoice>,
     funnel: Result<funnel::Prepared, String>,
 }
 
-/// Runs every rule with and without its feature on the fastest tree.
+/// Runs every rule with and without its feature, most on the fastest tree.
 ///
-/// Compares both sides with each other and with the exact truth, and plans their times.
+/// Compares both sides with each other and with the exact truth, and plans their timing.
 ///
 /// # Errors
 /// A camera without a view, a scene that a structure of the rules refuses.
@@ -106,7 +106,7 @@ pub fn prepare(
     })
 }
 
-/// Times of one process.
+/// Times the plan in one process.
 ///
 /// # Errors
 /// The errors of [`prepare`], and a scene other than the planned one.
@@ -129,7 +129,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
 }
 
 impl Prepared {
-    /// The advice from the times of all processes.
+    /// Derives the advice from the times of all processes.
     pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
         let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
@@ -142,7 +142,7 @@ impl Prepared {
         let rebuilds = duel.filter(|_| beside.rebuilt.is_some());
         let policies = rebuilds.unwrap_or(&structure.rows);
         let motion = (self.motion).map(|motion| motion.chosen(&structure, policies));
-        // The times of the stages come behind those of the tasks.
+        // The times of the stages follow those of the tasks.
         let tasks = self.plan.expected.len();
         let of_stages = processes.iter().map(|process| ProcessTimes {
             ln_ns: process.ln_ns[tasks..].to_vec(),
@@ -172,7 +172,7 @@ impl Prepared {
     }
 }
 
-/// All tasks, in the order in which every process enters them.
+/// All tasks, in the order in which every process adds them.
 struct Entered {
     tests: Vec<(CullingTest, usize)>,
     rules: Vec<(&'static Rule, Draft)>,
@@ -183,7 +183,7 @@ fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
-        // One that cannot be entered does not apply.
+        // A rule whose tasks cannot be added does not apply.
         let draft = (rule.enter)(trials);
         let none = |error: anyhow::Error| Draft::new(None, Finding::none(error.to_string()));
         rules.push((rule, draft.unwrap_or_else(none)));

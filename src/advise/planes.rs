@@ -1,4 +1,4 @@
-//! Rules about planes: which are tested, below which nodes, in which numbers.
+//! Rules about planes: which are tested, below which nodes, in which precision.
 
 use std::rc::Rc;
 
@@ -18,12 +18,12 @@ use crate::measure::Workload;
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, plane_test};
 use crate::shown::{count, counted, significant};
 
-/// Share of the planes above which the saving is lost in noise.
+/// Share of the planes above which the saving is not significant.
 const MOST_NEEDED: f64 = 0.99;
 
-/// Planes that the whole scene lies within: a camera does not need them.
+/// Rule: planes with the whole scene on their inner side are not needed.
 ///
-/// The far plane first of all, which paths often put behind the scene.
+/// Mostly far planes, which paths often put behind the scene.
 pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let bounds = &case.workload.scene.bounds;
@@ -38,7 +38,7 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let share = needed as f64 / all.max(1) as f64;
     let (inside, planes) = (all - needed, counted(all, "plane"));
     let reason = format!("scene is inside {inside} of {planes}");
-    // Two sides of the same planes would only differ by the day.
+    // Two sides with the same planes would only differ by noise.
     let sides = (inside > 0).then(|| {
         let left_out = trials.index(&*case.index, fewer);
         Sides::new(&case.spec.label, BASE, left_out)
@@ -46,26 +46,27 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     Ok(Draft::new(sides, Finding::new(share, MOST_NEEDED, reason)))
 }
 
-/// The volume without planes that contain the bounds: whatever lies within the
-/// bounds gets the same verdict, since plane tests are monotone.
+/// Removes the planes that contain the bounds.
+///
+/// Every box within the bounds gets the same verdict, since plane tests are monotone.
 fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
     let indexed = volume.planes().iter().zip(0..);
     let needed = indexed.filter(|(_, index)| !volume.contains(*index, bounds));
     let needed: Vec<_> = needed.map(|(plane, _)| *plane).collect();
-    // Finite planes, and no more of them than there were.
+    // Finite planes, and no more than before.
     ConvexVolume::from_planes(&needed).unwrap_or_else(|_| volume.clone())
 }
 
-/// Share of the plane tests that masks must save.
+/// Least share of the plane tests that masks must save.
 ///
-/// A small tree saves a few percent, and carrying masks is not free.
+/// A small tree saves a few percent, and carrying masks has a cost.
 const LEAST_SAVED: f64 = 0.1;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;
 
-/// Masks of open planes, which save plane tests below a node that a plane contains.
+/// Rule: plane masks, which skip planes that contain a node in its subtree.
 ///
-/// The side without them is a view whose nodes never close a plane (unless they close all).
+/// The side without masks is a view that leaves all planes open unless all are closed.
 pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
@@ -109,7 +110,7 @@ fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<
     });
 }
 
-/// The six-plane view with every plane open wherever one is.
+/// Six-plane view in which every plane is open if any is.
 struct Unmasked<'a>(&'a ConvexVolume);
 
 impl Predicate for Unmasked<'_> {
@@ -141,10 +142,9 @@ impl QueryVolume for Unmasked<'_> {
     }
 }
 
-/// Axes beyond the six planes: the volume's own box and its silhouettes.
+/// Rule: axes beyond the six planes, from the volume's own box and silhouettes.
 ///
-/// The exact test adds them. They cost test time and save the drawing of what cannot be
-/// seen.
+/// The exact test adds them. They cost test time and save the drawing of false positives.
 pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
@@ -163,14 +163,14 @@ pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     }))
 }
 
-/// Decides as the test that is taken, which has these axes or has not.
+/// Decides as the chosen test, which has these axes or has not.
 fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
     let Some(taken) = choice.name else {
         return finding;
     };
     let with_axes = |name: &str| name == CullingTest::Exact.name();
     let kept = with_axes(taken);
-    // The side taken by its test, the other by its best.
+    // The chosen side by its chosen test, the other by its best.
     let total = |with: bool| {
         let rows = choice.rows.iter().filter(|row| with_axes(row.test) == with);
         let rows = rows.filter(|row| with != kept || row.test == taken);
@@ -182,7 +182,7 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
     finding
 }
 
-/// The tree with the views of a culling against the tree with the default views.
+/// Compares the tree with another culling's views and the tree with default views.
 fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides> {
     let case = trials.case;
     let views = case.views_by(culling)?;
@@ -190,10 +190,10 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides>
     Ok(Sides::new(&case.spec.label, kept, BASE))
 }
 
-/// The plane test in f64.
+/// Rule: the plane test in f64.
 ///
-/// f32 planes, moved outward for their rounding, miss nothing either, and let through a
-/// margin that is mostly far too thin to hold an item.
+/// f32 planes, moved outward for their rounding, miss nothing either, and their margin is usually
+/// far too thin to contain an item.
 pub fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let planes = PlaneOptions::default();
@@ -210,10 +210,10 @@ fn of_margin(margin: f64) -> Finding {
     )
 }
 
-/// An origin of the scene's own.
+/// Rule: a scene origin of its own.
 ///
-/// Near the world's origin f32 has digits enough without. One side has the scene about its
-/// centre, the other about the world's origin.
+/// Near the world's origin f32 has enough digits without. One side has the scene about its centre,
+/// the other about the world's origin.
 pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let scene = case.workload.scene;
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn planes_that_cut_the_scene_stay() {
         let planes = [
-            // Cuts the bounds; holds them; just holds them; excludes them.
+            // Cuts the bounds; contains them; just contains them; excludes them.
             Plane::new(Vec3::X, 0.0),
             Plane::new(Vec3::Y, 5.0),
             Plane::new(Vec3::Z, 1.0),
@@ -332,7 +332,7 @@ mod tests {
                 let omission = settled(&choice);
                 let found = (omission.decision, omission.is_tie);
                 assert_eq!(found, (decision, is_tie), "{taken} {:?}", choice.ties);
-                // Without a test that is taken the rule decides.
+                // Without a chosen test the rule decides.
                 choice.name = None;
                 let leaves_out = settled(&choice).decision == Decision::LeaveOut;
                 assert_eq!(leaves_out, predicted);

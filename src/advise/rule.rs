@@ -1,6 +1,6 @@
-//! A rule of omission: its declaration and both sides as tasks.
+//! Rule of omission: its declaration, and both sides as tasks.
 //!
-//! Holds also the omission that follows from the rest of the advice.
+//! Also contains the omission that follows from the rest of the advice.
 
 use serde::Serialize;
 
@@ -10,21 +10,21 @@ use super::trials::{By, Check, Decision, Sides, Trials, is_longer, of_costs};
 use crate::funnel::FunnelReport;
 use crate::statistics::Estimate;
 
-/// A row of the table of rules.
+/// Row of the table of rules.
 #[derive(Debug, Serialize)]
 pub struct Rule {
-    /// Name of the rule, `plane-masks`.
+    /// Name of the rule, such as `plane-masks`.
     #[serde(rename = "rule")]
     pub name: &'static str,
-    /// The work that is needed or left out, in words.
+    /// Work that is needed or left out, in words.
     pub left_out: &'static str,
     /// Name and unit of the statistic.
     ///
-    /// The rule leaves out where it is at most the threshold.
+    /// The rule leaves the work out if the statistic is at most the threshold.
     pub statistic_name: &'static str,
     #[serde(skip)]
     pub(super) by: By,
-    /// Enters both sides.
+    /// Adds the tasks of both sides.
     #[serde(skip)]
     pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
 }
@@ -36,20 +36,21 @@ pub struct Advice {
     pub draw_ns: f64,
     /// Number of timed processes; an interval needs three or more.
     pub processes: usize,
-    /// A/A check: time of the fastest tree, entered a second time, / its own time; the
-    /// interval contains 1.
+    /// A/A check: time of a second copy of the base task / time of the first.
+    ///
+    /// The base task is the fastest tree; the interval should contain 1.
     pub twin: Option<Estimate>,
-    /// The structure to take.
+    /// Chosen structure.
     pub structure: StructureChoice,
-    /// The culling test to take.
+    /// Chosen culling test.
     pub test: TestChoice,
-    /// One omission per rule, which follows from all the rest.
+    /// One omission per rule.
     pub omissions: Vec<Omission>,
     /// Update policy; null for a still scene.
     pub motion: Option<MotionChoice>,
-    /// From which number of items and shares on another structure is faster.
+    /// Numbers of items and shares from which another structure is faster.
     pub changes: Vec<Change>,
-    /// The funnel of a few views, or the reason for which there is none.
+    /// Funnel of a few views, or the reason why there is none.
     #[serde(skip)]
     pub(super) funnel: Result<FunnelReport, String>,
 }
@@ -63,19 +64,19 @@ impl Advice {
     }
 }
 
-/// Statistic, threshold and reason of a rule, from the advice so far.
+/// Statistic, threshold and reason of a rule, given the advice so far.
 #[derive(Clone, Default)]
 pub struct Finding {
     /// Statistic and threshold, unless the rule does not apply.
     pub compared: Option<[f64; 2]>,
-    /// Assumption or error that decides, in a few words.
+    /// Decisive assumption or error, in a few words.
     ///
-    /// Or why the rule does not apply.
+    /// Or the reason why the rule does not apply.
     pub reason: String,
-    /// Time with and without, where more than the check counts, ns.
+    /// Times with and without, ns, if more than the check counts.
     pub cost_ns: Option<[f64; 2]>,
     pub is_tie: Option<bool>,
-    /// Choice or measurement that replaces the decision of rule and clock.
+    /// Choice or measurement that overrides rule and clock.
     pub leaves_out: Option<bool>,
     /// Measurement of a rule without tasks of its own.
     pub check: Option<Check>,
@@ -89,7 +90,7 @@ impl Finding {
         }
     }
 
-    /// A rule that does not apply, for a reason.
+    /// Finding of a rule that does not apply, with the reason.
     pub fn none(reason: impl Into<String>) -> Finding {
         Finding {
             reason: reason.into(),
@@ -98,22 +99,22 @@ impl Finding {
     }
 }
 
-/// Maker of a finding, from the advice so far and the rule's own measurement.
+/// Makes a finding from the advice so far and the rule's own measurement.
 type Conclude = dyn FnOnce(&Advice, Option<&Check>) -> Finding;
 
-/// A rule with its tasks entered, before its times.
+/// A rule with its tasks added, before its times.
 pub struct Draft {
     pub sides: Option<Sides>,
     pub conclude: Box<Conclude>,
 }
 
 impl Draft {
-    /// A finding that does not depend on times.
+    /// Draft whose finding does not depend on times.
     pub fn new(sides: impl Into<Option<Sides>>, finding: Finding) -> Draft {
         Draft::concluded(sides, move |_, _| finding)
     }
 
-    /// A finding from the advice so far and the rule's own measurement.
+    /// Draft whose finding depends on the advice so far and the rule's measurement.
     pub fn concluded(
         sides: impl Into<Option<Sides>>,
         conclude: impl FnOnce(&Advice, Option<&Check>) -> Finding + 'static,
@@ -126,7 +127,7 @@ impl Draft {
 }
 
 impl Rule {
-    /// Weighs statistic, clock and answers; a side that misses more is never taken.
+    /// Combines statistic, clock and answers; keeps work without which items are lost.
     pub fn omission(&'static self, finding: Finding, check: Option<Check>) -> Omission {
         let check = check.or(finding.check);
         let timed = check.as_ref().map(|c| [c.kept.ns, c.left_out.ns]);
@@ -171,30 +172,30 @@ impl Rule {
 /// Work that may be left out, with the decision.
 #[derive(Clone, Debug, Serialize)]
 pub struct Omission {
-    /// Its rule: names of work and statistic.
+    /// Rule, with the names of work and statistic.
     #[serde(flatten)]
     pub rule: &'static Rule,
-    /// Null where the rule does not apply to this scene.
+    /// Null if the rule does not apply to this scene.
     pub statistic: Option<f64>,
     /// Null without a statistic.
     pub threshold: Option<f64>,
-    /// Share of the time that leaving it out saves; negative where it costs.
+    /// Share of the time that the omission saves; negative if it costs.
     pub saving: Option<f64>,
     /// Decision from statistic, clock and answers.
     pub decision: Decision,
-    /// `true` if the processes do not tell the costs with and without it apart.
+    /// `true` if the costs with and without it tie.
     #[serde(rename = "tie")]
     pub is_tie: bool,
-    /// Assumption or error that decides, in a few words.
+    /// Decisive assumption or error, in a few words.
     pub reason: String,
-    /// Time kept and left out, with all that follows from it, ns.
+    /// Total cost with the work and without it, ns.
     pub cost_ns: Option<[f64; 2]>,
-    /// Measurement with and without the work; null where there was none.
+    /// Measurement with and without the work; null without one.
     pub check: Option<Check>,
 }
 
 impl Omission {
-    /// Returns yes, no, or either for a tie; empty where the rule does not apply.
+    /// Returns yes, no, or either for a tie; empty if the rule does not apply.
     pub fn answer(&self) -> &'static str {
         let by_cost = self.rule.by != By::Error && !self.loses_items();
         match self.decision {
@@ -211,7 +212,7 @@ impl Omission {
         self.check.as_ref().is_some_and(misses_more) || self.is_wrong()
     }
 
-    /// Returns `true` if two sides that must answer the same did not.
+    /// Returns `true` if two sides that must agree did not.
     pub fn is_wrong(&self) -> bool {
         let check = self.check.as_ref().filter(|_| self.rule.by == By::Time);
         check.is_some_and(|check| !check.same_answers)
@@ -225,7 +226,7 @@ pub use tests::some_rule;
 mod tests {
     use super::*;
 
-    /// A rule that enters nothing.
+    /// A rule without tasks.
     pub fn some_rule(by: By) -> &'static Rule {
         Box::leak(Box::new(Rule {
             name: "rule",

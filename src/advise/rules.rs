@@ -1,8 +1,8 @@
-//! The rules of omission, a function each, which enters both sides of a rule.
+//! Rules of omission: one function each, which adds both sides as tasks.
 //!
-//! Rules about structures, their updates and the camera's frame; rules about the stages
-//! behind the frustum, which read a funnel of a few views: one side removes what the other
-//! returns, so the drawing that this saves is weighed against the time that it takes.
+//! Rules about structures, their updates and the camera's basis; rules about the stages after the
+//! frustum, which read a funnel of a few views: one side removes candidates that the other returns,
+//! so the saved drawing is compared with the time of the stage.
 
 use std::slice;
 
@@ -51,10 +51,9 @@ pub(super) const RULES: &[Rule] = rows! {
         Error, frame_correction;
 };
 
-/// The index itself: below some number of items a scan is as fast.
+/// Rule: the index itself; below some number of items a scan is as fast.
 ///
-/// The number follows from the parts of the scene that are measured beside it
-/// ([`Axis::Items`]).
+/// The number follows from measurements on parts of the scene ([`Axis::Items`]).
 fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
@@ -65,7 +64,7 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     let all = items.len() as f64;
     Ok(Draft::concluded(sides, move |advice, check| {
         let taken = &advice.structure;
-        // Follows the structure taken, wherever there was a choice.
+        // Follows the chosen structure if there was a choice.
         let [tree, fastest] = taken.tree_and_scan();
         let both = tree.zip(fastest);
         let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
@@ -75,10 +74,10 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let below = change.and_then(|change| change.below.as_ref());
         let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
         let scan_wins = alone.map_or(taken.is_scan(), wins);
-        // Smaller parts are not measured once another structure is ahead.
+        // Smaller parts are not measured once another structure is faster.
         let measured = change.map(|change| change.measured[0]);
         let least = below.map(|turn| turn.upper).or(measured).unwrap_or(all);
-        // From the whole on where both tie there.
+        // The whole scene is the limit if both tie there.
         let below = below.filter(|turn| turn.structure == scan && turn.at < all);
         let crossing = match below {
             _ if scan_wins => all,
@@ -102,10 +101,10 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
     }))
 }
 
-/// The third dimension of the cells.
+/// Rule: the third dimension of the cells.
 ///
-/// An octree's third split separates nothing in a scene that is flatter than a quadtree's
-/// leaves are wide. Bounds stay three-dimensional either way.
+/// An octree's third split separates nothing in a scene that is flatter than a quadtree's leaves
+/// are wide. Bounds stay three-dimensional either way.
 fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let case = trials.case;
     let (scene, by) = (case.workload.scene, case.spec.execution);
@@ -134,9 +133,9 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     }))
 }
 
-/// A rebuild in every frame of a motion, against refits alone.
+/// Rule: a rebuild in every frame of a motion, compared with refits only.
 ///
-/// A refit keeps the tree and is quicker, but leaves a tree that answers more slowly.
+/// A refit keeps the tree and is faster, but queries of the refitted tree are slower.
 fn rebuild() -> anyhow::Result<Draft> {
     Ok(Draft::concluded(None, |advice, _| {
         let Some(motion) = &advice.motion else {
@@ -168,17 +167,18 @@ fn rebuild() -> anyhow::Result<Draft> {
     }))
 }
 
-/// Correcting a camera's frame, by a polar Newton step every 100 steps.
+/// Rule: correction of a camera basis by a polar Newton step per 100 rotations.
 ///
-/// Axes in f32 that are turned and never straightened drift by some 5e-8 a step: a walk of
-/// as many steps says how far. A frame that is built for each camera does not need it.
+/// Axes in f32 that are rotated and never corrected drift by some 5e-8 per step; a walk of as many
+/// steps as the path has cameras measures the error. A basis that is built for each camera
+/// does not need the correction.
 fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
     let path = trials.case.path;
     let steps = path.cameras.len() + path.left_out;
     let [(error, without), (_, with)] =
         ["f32", "f32-polar-100"].map(|method| walk(method, steps as u64));
     let [kept, left_out] = [with, without].map(|ask| trials.enter(false, ask));
-    // That of a basis that is lost is infinite.
+    // The error of a basis that is lost is infinite.
     let error = error.unwrap_or(f64::INFINITY);
     let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
     let finding = Finding::new(error, TOLERANCE, reason);
@@ -186,13 +186,13 @@ fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
     Ok(Draft::new(sides, finding))
 }
 
-/// Most views, and most items of all of them.
+/// Most views, and most items in all views together.
 const VIEWS: usize = 8;
 const ITEMS: usize = 100_000;
 /// Samples of a view and of the occlusion buffer.
 const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
 
-/// The stages on a tree.
+/// Input of a funnel with the stages on a tree.
 pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'s> {
     let most = (ITEMS / setting.scene.items.len().max(1)).clamp(1, VIEWS);
     let structures = slice::from_ref(tree);
@@ -204,7 +204,7 @@ pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'
     }
 }
 
-/// A rule about a stage; where the funnel has none it does not apply, for a reason.
+/// Rule about a stage; does not apply if the funnel lacks the stage.
 fn reads(stage: StageKind) -> anyhow::Result<Draft> {
     Ok(Draft::concluded(None, move |advice, _| {
         let funnel = advice.funnel.as_ref().map_err(String::clone);
@@ -213,7 +213,7 @@ fn reads(stage: StageKind) -> anyhow::Result<Draft> {
     }))
 }
 
-/// The gain of a stage, weighed.
+/// Finding for a stage, from its gain.
 fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Finding, String> {
     let gain = |stage| funnel.gains.iter().find(|gain| gain.stage == stage);
     let mut left_out = funnel.left_out.iter();
@@ -230,9 +230,9 @@ fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Find
     })
 }
 
-/// Leaves out where removing takes longer than drawing the removed candidates.
+/// Leaves a stage out if it takes longer than drawing what it removes.
 ///
-/// A candidate, `one`, that is not removed costs `cost_ns`.
+/// A candidate (`one`) that is not removed costs `cost_ns`.
 fn weigh(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
     let (with, without) = (gain.with_count, gain.without_count);
     if without == 0.0 {
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(dear.statistic, Some(0.8));
         assert!((dear.threshold.unwrap() - 200.0 / 255.0).abs() < 1e-12);
         assert_eq!(dear.reason, "5.10 ns/thing, pays from 5.00");
-        // A cost that is not 0 is not shown as 0.
+        // A positive cost is not shown as 0.
         let little = settled([0.0, 1e6], 1.1, 1.0);
         assert_eq!(little.reason, "1.00 ns/thing, pays from 0.0000100");
         let cheap = settled([10.0, 50.0], 3.0, 4.9);

@@ -1,8 +1,7 @@
 //! Tasks of the rules and of the choice of a test.
 //!
-//! Every process enters them in the same order; one runs and compares them; all time them
-//! side by side. A check has both sides as measured, and a tie shows in the interval of
-//! their ratio.
+//! Every process adds them in the same order; one process runs and compares them; all time them
+//! side by side. A check has both sides as measured; a tie shows in the interval of their ratio.
 
 use std::ops::Deref;
 
@@ -16,20 +15,20 @@ use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
 
-/// The task that all others are compared with: the fastest tree, six planes, f32.
+/// Task that all others are compared with: the fastest tree, six planes, f32.
 pub const BASE: usize = 0;
 
 pub struct Trials<'c> {
     pub case: &'c Case<'c>,
-    /// Tasks, and whether each is compared with the truth.
+    /// Tasks, each with a flag that is true if it is compared with the truth.
     asks: Vec<(Ask<'c>, bool)>,
 }
 
 /// Answers of all tasks.
 pub struct Answered {
-    /// The answers by task and camera.
+    /// Answers by task and camera.
     pub answers: Vec<Vec<Answer>>,
-    /// Errors of each judged camera, of tasks that are compared with the truth.
+    /// Errors by camera with a truth, for tasks that are compared with it.
     errors: Vec<Option<Vec<ErrorCount>>>,
 }
 
@@ -43,21 +42,21 @@ impl<'c> Trials<'c> {
         trials
     }
 
-    /// Enters the base (again); the index of the task.
+    /// Adds the base task (again); returns its index.
     pub fn add_base(&mut self) -> usize {
         let case = self.case;
         self.index(&*case.index, &case.workload.views[..])
     }
 
-    /// Enters a task; its index.
+    /// Adds a task; returns its index.
     ///
-    /// It is judged if its answers are items of the scene in view.
+    /// `is_judged` is true if its answers are items in view, to be compared with the truth.
     pub fn enter(&mut self, is_judged: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
         self.asks.push((Box::new(ask), is_judged));
         self.asks.len() - 1
     }
 
-    /// Enters an index that is queried with the given views; its index among the tasks.
+    /// Adds an index queried with the given views; returns the task's index.
     pub fn index(
         &mut self,
         index: impl Deref<Target = dyn DynIndex> + 'c,
@@ -68,7 +67,7 @@ impl<'c> Trials<'c> {
         })
     }
 
-    /// Runs every task for every camera, and compares with the truth.
+    /// Runs every task for every camera, and compares the answers with the truth.
     pub fn answered(&self) -> Answered {
         let truths = self.case.truths();
         let mut out: Vec<ItemId> = Vec::new();
@@ -103,24 +102,24 @@ impl<'c> Trials<'c> {
 }
 
 impl Answered {
-    /// Errors of a task over all judged cameras.
+    /// Errors of a task, summed over the cameras with a truth.
     pub fn errors(&self, task: usize) -> Option<ErrorCount> {
         Some(self.by_camera(task)?.iter().copied().sum())
     }
 
-    /// Mean of the judged cameras.
+    /// False positives of a task per query, mean over the cameras with a truth.
     pub fn false_positives_per_query(&self, task: usize) -> Option<f64> {
         let judged = self.by_camera(task).filter(|own| !own.is_empty())?.len();
         Some(self.errors(task)?.false_positives as f64 / judged as f64)
     }
 
-    /// Errors of a task, by judged camera.
+    /// Errors of a task, by camera with a truth.
     pub fn by_camera(&self, task: usize) -> Option<&[ErrorCount]> {
         self.errors[task].as_deref()
     }
 }
 
-/// The two sides of a check, by their tasks.
+/// Two sides of a check, by the indices of their tasks.
 pub struct Sides {
     on: String,
     kept: usize,
@@ -136,7 +135,7 @@ impl Sides {
         }
     }
 
-    /// The check; NaN where a task has no time, after a panic.
+    /// Measured check; NaN if a task has no time, after a panic.
     pub fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
         let side = |task| {
             let errors = answered.errors(task);
@@ -157,13 +156,13 @@ impl Sides {
     }
 }
 
-/// Two times are a tie unless the interval of their ratio lies beyond this.
+/// Least significant ratio: times tie unless their interval lies beyond it.
 ///
-/// The layout of memory and code alone makes differences of some percent, which the next
-/// run on the same machine may reverse.
+/// The layout of memory and code alone makes differences of some percent, which the next run on the
+/// same machine may reverse.
 pub(super) const TIE: f64 = 1.05;
 
-/// Returns true if the first of two times is the longer one, from their ratio.
+/// Returns `true` if a ratio shows its first time to be the longer one.
 ///
 /// `None` for a tie. Without an interval the value decides.
 pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
@@ -172,9 +171,9 @@ pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
     is_told.then_some(ratio.value > 1.0)
 }
 
-/// Ratio of two costs from the ratio of the times in them.
+/// Ratio of two costs, from the ratio of the times that they include.
 ///
-/// Each cost is given behind its time.
+/// Each side is `[time, cost]`.
 pub(super) fn of_costs(times: Estimate, own: [f64; 2], other: [f64; 2]) -> Estimate {
     let ([own_ns, own], [other_ns, other]) = (own, other);
     let of = |ratio: f64| (ratio * other_ns + own - own_ns) / other;
@@ -189,58 +188,58 @@ pub(super) fn of_costs(times: Estimate, own: [f64; 2], other: [f64; 2]) -> Estim
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decision {
-    /// It costs more than it saves.
+    /// The feature costs more than it saves.
     LeaveOut,
-    /// It pays, or nothing shows that it does not.
+    /// The feature pays, or nothing shows that it does not.
     Keep,
-    /// The scene or the path has nothing of the kind.
+    /// The rule does not apply to the scene or the path.
     NotApplicable,
 }
 
-/// The judge of a rule.
+/// Criterion of a rule's decision.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum By {
-    /// Both sides answer the same: the clock, and the rule where that is a tie.
+    /// Times decide if both sides give the same answers; the rule decides a tie.
     Time,
-    /// The sides differ in more than time: the rule, whose statistic is a cost.
+    /// The rule decides by a cost, as the sides differ in more than time.
     Rule,
-    /// The rule, whose statistic is an error; costs that tie do not matter.
+    /// The rule decides by an error; a tie of costs does not matter.
     Error,
 }
 
 /// Times and answers with the work of a rule (kept) and without it (left out).
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Check {
-    /// The structure or the work that was measured.
+    /// Structure or work that was measured.
     pub on: String,
-    /// With the work.
+    /// Side with the work.
     pub kept: Side,
-    /// Without it.
+    /// Side without it.
     pub left_out: Side,
     /// Time with it / time without: above 1, leaving out is faster.
     ///
     /// `None` without times.
     #[serde(flatten, serialize_with = "flat::ratio")]
     pub ratio: Option<Estimate>,
-    /// `true` if every camera got the same set from both.
+    /// `true` if both sides gave the same set for every camera.
     pub same_answers: bool,
 }
 
-/// One side of a check; errors are null without a comparison with the truth.
+/// One side of a check; errors are null if not compared with the truth.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Side {
-    /// Thread CPU time of a camera, mean over cameras and processes, ns.
+    /// Thread CPU time per camera, mean over cameras and processes, ns.
     pub ns: f64,
     /// False positives / visible items.
     pub excess: Option<f64>,
-    /// Mean of the judged cameras.
+    /// Mean over the cameras with a truth.
     pub false_positives_per_query: Option<f64>,
-    /// Visible items that were not returned, in millionths.
+    /// False negatives per million visible items.
     pub false_negative_ppm: Option<f64>,
 }
 
 impl Check {
-    /// Times alone, of two sides with the same answers.
+    /// Check of times only, for two sides with the same answers.
     pub(super) fn of_times(on: String, ns: [f64; 2], ratio: Option<Estimate>) -> Check {
         let [kept, left_out] = ns.map(|ns| Side {
             ns,
@@ -261,7 +260,7 @@ mod tests {
     use super::super::rule::{Finding, Omission, some_rule};
     use super::*;
 
-    /// A check with a ratio of times and what each side misses.
+    /// A check with a ratio of times and the misses of each side.
     fn check(ratio: f64, missed: [f64; 2]) -> Check {
         let times = Some(Estimate::exact(ratio));
         let mut check = Check::of_times("wide".to_owned(), [ratio * 100.0, 100.0], times);
