@@ -1,8 +1,8 @@
-//! The planes of a camera to 250 bits.
+//! Planes of a camera to 250 bits.
 //!
-//! Pose and lens count as exact real numbers; roots, sines and cosines are carried far
-//! beyond what any tie could need. Exact sums and products are shared
-//! with the cameras under test; tests judge both by rationals.
+//! Pose and lens count as exact real numbers; roots, sines and cosines are computed far more
+//! precisely than any tie could need. Exact sums and products are shared with the cameras under
+//! test; tests check both with rationals.
 
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ fn times(a: &Expansion, b: &Expansion) -> Expansion {
     (a * b).leading(PRECISION.terms + 1)
 }
 
-/// The cross product to the terms that are carried.
+/// Cross product, rounded to the working precision.
 fn cross(a: &ExactVector, b: &ExactVector) -> ExactVector {
     exact::cross(a, b).map(|component| component.leading(PRECISION.terms + 1))
 }
@@ -31,20 +31,18 @@ fn unit(v: &ExactVector) -> ExactVector {
 }
 
 impl Oracle {
-    /// Camera level: the view volume of a pose and a lens, as real numbers.
+    /// Oracle at camera level: the view volume of a pose and a lens as real numbers.
     ///
-    /// In coordinates about `origin`.
+    /// In coordinates relative to `origin`.
     ///
-    /// Every verdict is that about the real volume, or a touch marked as
-    /// undecided, where the two cannot be distinguished: pose and lens count as
-    /// exact, lengths from 1e-60 to 1e60 and angles from 1e-12 degrees are
-    /// carried without loss; a window narrower than 2^-150 of its depth has no width
-    /// where it looks along an axis. A matrix is the volume alone, and its planes are
-    /// carried without any error. Some ten times the cost of
-    /// [`Oracle::of_volume`].
+    /// Each verdict is correct for the real volume, or is a touch marked as undecided if the
+    /// precision does not suffice. Pose and lens count as exact; lengths from 1e-60 to 1e60 and
+    /// angles from 1e-12 degrees are represented without loss; a window narrower than 2^-150 of its
+    /// depth has zero width if it looks along an axis. A matrix is the volume itself, and its
+    /// planes have no error at all. Costs some ten times [`Oracle::of_volume`].
     ///
-    /// `None` if pose and lens make no camera: a value that is not finite, no
-    /// direction of view, `up` zero or exactly parallel to it.
+    /// `None` if pose and lens make no camera: a value that is not finite, no direction of view,
+    /// `up` zero or exactly parallel to it.
     pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
         if let LensKind::Matrix(matrix) = lens.kind() {
             let constraints = planes_of_matrix(matrix, origin);
@@ -79,14 +77,14 @@ struct View {
 }
 
 impl View {
-    /// The points x with `normal . (x - eye) + offset >= 0`.
+    /// Half-space of the points x with `normal . (x - eye) + offset >= 0`.
     fn half_space(&self, normal: &ExactVector, offset: &Expansion) -> HalfSpace {
         let p = PRECISION;
         // Products of three normals and an offset must stay within f64.
         let exponent = exact::exponent(normal).unwrap_or(0);
         let normal = normal.clone().map(|n| n.scaled(-exponent));
         let offset = offset.scaled(-exponent);
-        // Each component is as large as the whole normal, as far as noise goes.
+        // Noise in each component is relative to the whole normal.
         let sizes = normal.iter().map(|n| n.estimate().abs());
         let size = sizes.fold(0.0, f64::max);
         let normal = normal.map(|n| {
@@ -102,7 +100,7 @@ impl View {
 fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
     let number = |x: f64| Expansion::from(x);
     let mut planes = Vec::with_capacity(6);
-    // Left, right, bottom and top edges of the window and how far ahead it is.
+    // Left, right, bottom and top edges of the window, and its depth.
     let (edges, depth) = match *lens.kind() {
         LensKind::Perspective { fovy_deg, aspect } => {
             let half = times(&exact::pi(), &number(fovy_deg)).over(360.0, PRECISION.terms + 1);
@@ -111,7 +109,7 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
             ([-&wide, wide, -&sine, sine], cosine)
         }
         LensKind::OffAxis { window } => (window.map(number), number(lens.near())),
-        // Has planes of its own, see `planes_of_matrix`.
+        // A matrix has its own planes, see `planes_of_matrix`.
         LensKind::Matrix(_) => return planes,
         LensKind::Orthographic { height, aspect } => {
             let half = number(height / 2.0);
@@ -120,7 +118,7 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         }
     };
     let axes = [&view.u, &view.u, &view.v, &view.v];
-    // The lower edge of two looks along the axis.
+    // The normal at the lower edge of each axis points along the axis.
     for ((axis, edge), sign) in axes.into_iter().zip(&edges).zip([1.0, -1.0, 1.0, -1.0]) {
         let sign = number(sign);
         planes.push(if lens.is_orthographic() {
@@ -143,9 +141,10 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
     planes
 }
 
-/// The rows' sums and differences (Gribb and Hartmann 2001) about `origin`, each
-/// times a power of two. All of it is exact. One without a normal and above zero
-/// (an infinite far plane) bounds nothing.
+/// Exact planes of a matrix about `origin`: sums and differences of its rows.
+///
+/// (Gribb and Hartmann 2001.) Each is scaled by a power of two. A plane with a zero normal and a
+/// positive offset (an infinite far plane) bounds nothing.
 fn planes_of_matrix(matrix: &ViewProjection, origin: DVec3) -> Vec<HalfSpace> {
     let [x, y, z, w] = matrix.rows();
     let row = |signs: [f64; 2], parts: [&[f64; 4]; 2]| {

@@ -1,22 +1,18 @@
-//! Certificates of half-spaces.
+//! Certificates of half-spaces: combinations of at most four that exclude a box.
 //!
-//! Every way in which at most four of them together can shut out a box. Boxes are tested
-//! against certificates in `evaluate`.
+//! Boxes are tested against certificates in `evaluate`.
 //!
-//! P is the intersection of half-spaces `n_i.x + d_i >= 0`, B a box. By
-//! Farkas' lemma they have no common point iff some non-negative combination
-//! `N.x + D` of the constraints (N = sum l_i n_i, D = sum l_i d_i) is negative
-//! on all of B, that is, at its p-vertex. That maximum is linear in the l_i
-//! wherever the signs of N do not change, so its least value over the cone of
-//! all l is reached on an extreme ray of such a piece: a combination of m
-//! constraints with m - 1 components of N zero. One constraint gives the
-//! planes themselves; two with one zero component the shadows of P along an
-//! axis (the cross products of an edge with an axis, in other words); three
-//! with two the bounds of P along an axis; four with N = 0 say that P itself
-//! is empty. Only products and sums occur: no division, no vertices, and P need
-//! not be bounded. (Motzkin's transposition theorem says the same
-//! of open half-spaces with "not positive" in place of "negative": a least
-//! value of zero is a touch.)
+//! P is the intersection of half-spaces `n_i.x + d_i >= 0`, B a box. By Farkas' lemma they have no
+//! common point iff some non-negative combination `N.x + D` of the constraints (N = sum l_i n_i, D
+//! = sum l_i d_i) is negative on all of B, that is, at its p-vertex. That maximum is linear in the
+//! l_i wherever the signs of N do not change, so its least value over the cone of all l is reached
+//! on an extreme ray of such a piece: a combination of m constraints with m - 1 components of N
+//! zero. One constraint gives the planes themselves. Two with one zero component give the shadows
+//! of P along an axis (in other words, the cross products of an edge with an axis). Three with two
+//! zero components give the bounds of P along an axis. Four with N = 0 state that P itself is
+//! empty. Only products and sums occur: no division, no vertices, and P need not be bounded.
+//! (Motzkin's transposition theorem states the same of open half-spaces with "not positive" in
+//! place of "negative": a least value of zero is a touch.)
 
 use std::cell::OnceCell;
 
@@ -30,22 +26,20 @@ pub(super) enum Extent {
     /// No point satisfies all constraints.
     #[default]
     Empty,
-    /// Points, but none that satisfies all constraints strictly.
+    /// Some points satisfy all constraints, but none strictly.
     ///
-    /// Nothing is more than touched.
+    /// A box can at most touch the volume.
     Flat,
-    /// An interior.
+    /// The volume has an interior.
     Solid,
 }
 
-/// The faces of a volume, and its bounds and shadows.
+/// Certificates of a volume: its faces, and its bounds and shadows.
 ///
-/// All certificates of the half-spaces that can be the tightest for some box.
-///
-/// O(m^4) steps in f64 for m of them; exact sums only for what is kept and where rounding
-/// could matter.
+/// These are all certificates that can be the tightest for some box. O(m^4) steps in f64 for m
+/// half-spaces; exact sums only for those that are kept and where rounding could matter.
 pub(super) fn certificates(given: Vec<HalfSpace>, p: Precision) -> (Extent, [Vec<HalfSpace>; 2]) {
-    // A zero normal is no constraint, or one that nothing satisfies.
+    // A zero normal is no constraint, or one that no point satisfies.
     let mut constraints = Vec::with_capacity(given.len());
     for constraint in given {
         let is_zero = constraint.normal.iter().all(|n| p.sign(n) == 0);
@@ -69,7 +63,7 @@ pub(super) fn certificates(given: Vec<HalfSpace>, p: Precision) -> (Extent, [Vec
     let bounds = search.found.len();
     search.pairs(true);
     if search.extent == Extent::Flat {
-        // Without an interior there are no edges to speak of: keep all.
+        // Edges are not defined without an interior: keep all.
         search.found.truncate(bounds);
         search.pairs(false);
     }
@@ -79,21 +73,21 @@ pub(super) fn certificates(given: Vec<HalfSpace>, p: Precision) -> (Extent, [Vec
     (search.extent, [search.constraints, search.found])
 }
 
-/// The two other axes, in the order that makes a determinant of them.
+/// The two other axes, in the order of the determinant's sign.
 const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 struct Search {
     precision: Precision,
     constraints: Vec<HalfSpace>,
     rough: RoughSpaces,
-    /// Minors computed so far, by both constraints and the axis left out.
+    /// Minors computed so far, indexed by both constraints and the omitted axis.
     minors: Vec<[OnceCell<Number>; 3]>,
     extent: Extent,
     found: Vec<HalfSpace>,
 }
 
 impl Search {
-    /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` without `axis`.
+    /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` that omits `axis`.
     fn minor(&self, i: usize, j: usize, axis: usize) -> &Number {
         self.minors[i * self.constraints.len() + j][axis].get_or_init(|| {
             let [a, b] = OTHERS[axis];
@@ -108,8 +102,9 @@ impl Search {
             .combined((0..3).map(|k| (&first[k], self.minor(j, l, k))))
     }
 
-    /// A combination of constraints: a certificate, or, if nothing is left of
-    /// the normal, a verdict about the volume itself.
+    /// Adds a combination of constraints as a certificate.
+    ///
+    /// If its normal is zero, it is a verdict about the volume itself.
     fn take<const N: usize>(
         &mut self,
         weights: &[Number; N],
@@ -139,11 +134,12 @@ impl Search {
         self.extent = self.extent.min(verdict);
     }
 
-    /// Two constraints that pull an axis both ways. Of a volume with an
-    /// interior only those that meet on it matter (`only_edges`): the boundary
-    /// of {p - b : p in P, b in B} has no other faces than a face of one and a
-    /// corner of the other, or an edge of each; where an edge of P takes part,
-    /// two planes through that edge make the certificate.
+    /// Adds certificates of two constraints whose normals differ in sign on an axis.
+    ///
+    /// In a volume with an interior only pairs that share an edge matter (`only_edges`): each face
+    /// of the boundary of {p - b : p in P, b in B} comes from a face of one and a corner of the
+    /// other, or from an edge of each. If an edge of P is involved, two planes through that edge
+    /// make the certificate.
     fn pairs(&mut self, only_edges: bool) {
         for [i, j] in combinations(self.constraints.len()) {
             if only_edges && self.rough.edge_misses(i, j) {
@@ -160,7 +156,7 @@ impl Search {
         }
     }
 
-    /// Adds certificates of three constraints whose sum has one axis only.
+    /// Adds certificates of three constraints whose sum is along one axis.
     ///
     /// Only the tightest of those that bound the same direction is needed.
     fn triples(&mut self) {
@@ -194,7 +190,7 @@ impl Search {
         }
     }
 
-    /// Four constraints that leave no axis at all.
+    /// Tests combinations of four constraints with a zero normal.
     fn quadruples(&mut self) {
         for quadruple in combinations(self.constraints.len()) {
             match self.rough.quadruple(quadruple) {
@@ -220,8 +216,9 @@ impl Search {
         }
     }
 
-    /// The weights made positive, if all are strictly of one sign: where one is
-    /// zero, fewer constraints say the same.
+    /// Makes the weights positive if all are strictly of one sign; else `None`.
+    ///
+    /// If a weight is zero, fewer constraints give the same certificate.
     fn of_one_sign<const N: usize>(&self, weights: [Number; N]) -> Option<[Number; N]> {
         let sign = self.precision.sign(&weights[0]);
         let agree = sign != 0 && weights.iter().all(|w| self.precision.sign(w) == sign);
@@ -229,9 +226,9 @@ impl Search {
     }
 }
 
-/// Keeps the tightest bound along each direction of an axis.
+/// Keeps the tightest bound in each axis direction.
 ///
-/// Also those that rounding cannot distinguish from it.
+/// Also keeps those that rounding cannot distinguish from it.
 fn keep_tightest(bounds: &mut Vec<HalfSpace>) {
     /// Far above the rounding of the two estimates that make a ratio.
     const DOUBT: f64 = 1e-12;
@@ -263,8 +260,7 @@ mod tests {
         };
         let one = Expansion::from(1.0);
         let sum = |a: f64, b: f64| &Expansion::from(a) + &Expansion::from(b);
-        // 1 / (1 + 0.9 h) is less than 1 - 0.6 h, but in f64 it is 1 against
-        // 1 - h.
+        // 1 / (1 + 0.9 h) is less than 1 - 0.6 h, but in f64 these are 1 and 1 - h.
         let tightest = bound(sum(1.0, 1.8 * half_ulp), one.clone());
         let other = bound(one.clone(), sum(1.0 - 2.0 * half_ulp, 0.8 * half_ulp));
         let loose = bound(one.clone(), sum(1.0, 1e-9));

@@ -1,25 +1,25 @@
 //! Numbers of the oracle, and the value of a certificate at a box.
 //!
-//! Numbers are exact, or precise to a stated number of terms; each has the sum of the magnitudes
-//! it came from, which separates a sign from noise. Values are in f64 with a bound of their
-//! error, or exact.
+//! Numbers are exact, or precise to a stated number of terms; each has the sum of the magnitudes it
+//! came from, which separates a sign from noise. Values are in f64 with a bound of their error, or
+//! exact.
 
 use glam::DVec3;
 
 use crate::arithmetic::{Expansion, two_product, two_sum};
 use crate::geometry::PlaneF64;
 
-/// How exactly to calculate.
+/// Precision of the calculations.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Precision {
-    /// Leading terms kept of every result, also by calculations with roots and series.
+    /// Leading terms kept of every result, also in calculations with roots and series.
     pub terms: usize,
-    /// A number not above this part of its size is taken for zero.
+    /// Relative size up to which a number counts as zero.
     tolerance: f64,
 }
 
 impl Precision {
-    /// No error at all: for planes that are exact objects.
+    /// Exact arithmetic, for planes that are exact objects.
     pub const EXACT: Precision = Precision {
         terms: usize::MAX,
         tolerance: 0.0,
@@ -56,23 +56,23 @@ impl Precision {
         Number::new(self.cut(&a.value * &b.value), a.size * b.size)
     }
 
-    /// The sum of products.
+    /// Sum of products.
     pub fn combined<'a>(self, products: impl Iterator<Item = (&'a Number, &'a Number)>) -> Number {
         let products = products.map(|(a, b)| self.multiply(a, b));
         products.reduce(|a, b| self.add(&a, &b)).unwrap_or_default()
     }
 
-    /// `a*d - b*c`.
+    /// Computes `a*d - b*c`.
     pub fn determinant(self, [a, b, c, d]: [&Number; 4]) -> Number {
         self.subtract(&self.multiply(a, d), &self.multiply(b, c))
     }
 
-    /// Returns whether a value may be zero, given its size.
+    /// Returns `true` if a value may be zero, given its size.
     pub fn is_noise(self, value: f64, size: f64) -> bool {
         value.abs() <= self.tolerance * size
     }
 
-    /// -1, 0 or 1; 0 also for what may be nothing but noise.
+    /// Sign -1, 0 or 1; 0 also if the number may be only noise.
     pub fn sign(self, a: &Number) -> i32 {
         match self.is_noise(a.value.estimate(), a.size) {
             true => 0,
@@ -80,7 +80,7 @@ impl Precision {
         }
     }
 
-    /// The number, or a clean zero if it may be nothing but noise.
+    /// The number, or an exact zero if it may be only noise.
     pub fn cleaned(self, a: Number) -> Number {
         match self.sign(&a) {
             0 => Number::new(Expansion::ZERO, a.size),
@@ -89,7 +89,7 @@ impl Precision {
     }
 }
 
-/// One constraint `normal . x + d >= 0`.
+/// Half-space `normal . x + d >= 0`.
 #[derive(Clone, Debug)]
 pub(super) struct HalfSpace {
     pub normal: [Number; 3],
@@ -129,10 +129,10 @@ impl Number {
     }
 }
 
-/// A certificate in full.
+/// Certificate in full precision.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
-    /// Axis and term of its coefficient, smallest first.
+    /// Axis and value of each term of the coefficients, smallest first.
     terms: Vec<(usize, f64)>,
     d: Vec<f64>,
     /// Magnitudes before cancellation, per axis.
@@ -140,11 +140,12 @@ pub(super) struct Exact {
     size_of_d: f64,
 }
 
-/// The filter errs by less than this part of its magnitude: three coefficients
-/// and an offset rounded once (2^-53 each), three products and three sums.
+/// Bound of the filter's error relative to its magnitude.
+///
+/// Three coefficients and an offset rounded once (2^-53 each), three products and three sums.
 const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// The bounds of a box in f64.
+/// Bounds of a box in f64.
 pub(super) struct Corners {
     pub min: DVec3,
     pub max: DVec3,
@@ -157,7 +158,7 @@ impl Corners {
 }
 
 impl HalfSpace {
-    /// The filter: a certificate in f64, each coefficient rounded once.
+    /// Filter of a certificate: f64, each coefficient rounded once.
     pub fn rounded(&self) -> PlaneF64 {
         let normal = self.normal.each_ref().map(Number::estimate);
         PlaneF64::new(normal.into(), self.d.estimate())
@@ -192,7 +193,7 @@ impl Exact {
         }
     }
 
-    /// The value at the p-vertex, rounded; its sign is exact. Noise is zero.
+    /// Value at the p-vertex, rounded; its sign is exact. Noise gives zero.
     pub fn at_p_vertex(&self, b: &Corners, precision: Precision) -> f64 {
         // The sign of a coefficient is that of its largest, last term.
         let mut corner = b.max;
@@ -204,7 +205,7 @@ impl Exact {
             [rest, product]
         });
         let parts = products.chain(self.d.iter().copied());
-        // Most ties are between short numbers, whose sum loses nothing.
+        // Most ties are between short numbers, which sum without loss.
         let (mut value, mut lost) = (0.0_f64, 0.0);
         for part in parts.clone() {
             let (sum, error) = two_sum(value, part);
@@ -224,8 +225,9 @@ impl Exact {
     }
 }
 
-/// A point inside all faces: the mean of the corners. None without at least
-/// four corners; only a hint, so f64 will do.
+/// Point inside all faces: the mean of the corners.
+///
+/// `None` with fewer than four corners. Only a hint, so f64 is enough.
 pub(super) fn inner_point(faces: &[PlaneF64]) -> Option<DVec3> {
     let corners = PlaneF64::corners(faces);
     let sum: DVec3 = corners.iter().sum();

@@ -1,7 +1,7 @@
-//! The oracle: decides exactly whether a box and a convex volume share a point.
+//! Oracle: decides exactly whether a box and a convex volume share a point.
 //!
-//! Its verdicts are OUT, TOUCH and IN, at planes level (f32 planes and boxes count as exact)
-//! or at camera level (the camera's parameters do).
+//! Verdicts are OUT, TOUCH and IN, at planes level (f32 planes and boxes count as exact) or at
+//! camera level (the camera's parameters do).
 
 mod camera;
 mod certificates;
@@ -16,21 +16,21 @@ use crate::geometry::{Aabb, ConvexVolume, PlaneF64};
 
 pub use crate::camera::Pose;
 
-/// How a closed box lies to a closed volume.
+/// Relation of a closed box to a closed volume.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum Verdict {
     /// No common point.
     Out,
-    /// Common points, but none of them strictly inside all planes.
+    /// Common points, but none strictly inside all planes.
     Touch,
     /// A point of the box lies strictly inside all planes.
     In,
 }
 
-/// A verdict and whether it could be proved.
+/// A verdict, and whether it is proven.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Judgement {
-    /// The verdict, as far as it could be proved.
+    /// Verdict, as far as it is proven.
     pub verdict: Verdict,
     /// True for a tie too close to decide at camera level, which counts as a touch.
     ///
@@ -66,15 +66,15 @@ pub struct Oracle {
     extent: Extent,
     faces: usize,
     precision: Precision,
-    /// The same certificates twice: in f64 for the filter, and in full.
+    /// Certificates rounded to f64, for the filter.
     filter: Vec<PlaneF64>,
     exact: Vec<Exact>,
-    /// A point well inside the volume, to prove overlaps with.
+    /// Point well inside the volume, used to prove overlaps.
     inner: Option<DVec3>,
 }
 
 impl Oracle {
-    /// Oracle at planes level, for the planes as they are, without any error.
+    /// Oracle at planes level, exact for the given planes.
     ///
     /// Products have at most four factors of f32, so nothing overflows or underflows.
     pub fn of_volume(volume: &ConvexVolume) -> Oracle {
@@ -100,19 +100,19 @@ impl Oracle {
         }
     }
 
-    /// The verdict about a box with finite bounds.
+    /// Verdict about a box with finite bounds.
     ///
-    /// For other bounds it means nothing. An inverted box is empty, and so OUT.
+    /// Meaningless for other bounds. An inverted box is empty, and so OUT.
     pub fn verdict(&self, b: &Aabb) -> Verdict {
         self.judge(b).verdict
     }
 
-    /// The verdict, and whether it is proved; at planes level it always is.
+    /// Verdict, and whether it is proven; at planes level it always is.
     pub fn judge(&self, b: &Aabb) -> Judgement {
         self.judge_wide(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
-    /// The same about a box in f64, between finite corners of at most 1e60.
+    /// Verdict about an f64 box with finite corners of at most 1e60.
     pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
         let corners = &Corners { min, max };
         let judged = |verdict, undecided| Judgement { verdict, undecided };
@@ -164,7 +164,7 @@ impl Oracle {
         self.depth_wide(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
-    /// The same of a box in f64.
+    /// Depth of an f64 box, as [`Oracle::depth`] defines it.
     pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
         let corners = &Corners { min, max };
         if corners.is_empty() || self.extent == Extent::Empty {
@@ -181,17 +181,18 @@ impl Oracle {
         depths.fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns whether one plane has the whole box on its outer side, exactly.
+    /// Returns `true` if one plane has the whole box on its outer side, exactly.
     ///
-    /// A six-plane test without any error.
+    /// This is a six-plane test without any error.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
         let [min, max] = [b.min, b.max].map(|corner| corner.as_dvec3());
         let corners = Corners { min, max };
         self.extent == Extent::Empty || (0..self.faces).any(|face| self.sign(face, &corners) < 0)
     }
 
-    /// The sign of a certificate at the box's p-vertex, exact sums where the filter
-    /// does not decide.
+    /// Sign of a certificate at the box's p-vertex.
+    ///
+    /// Uses exact sums if the filter does not decide.
     #[inline]
     fn sign(&self, certificate: usize, corners: &Corners) -> i32 {
         let (value, error) = at_p_vertex(&self.filter[certificate], corners);
@@ -205,8 +206,9 @@ impl Oracle {
         i32::from(value > 0.0) - i32::from(value < 0.0)
     }
 
-    /// Returns whether a point of the box lies strictly inside all planes for certain:
-    /// the one nearest to the volume's inner point, or the box's centre.
+    /// Returns `true` if a point of the box is certainly strictly inside all planes.
+    ///
+    /// Tests the point nearest to the volume's inner point, and the box's centre.
     fn witnessed(&self, b: &Corners) -> bool {
         let is_inside = |point: DVec3| {
             self.filter[..self.faces].iter().all(|face| {

@@ -1,21 +1,22 @@
 //! Filter of the oracle's preparation: minors and determinants in f64.
 //!
-//! Each has a bound of its error, so exact sums are only formed where rounding could
-//! matter.
+//! Each has an error bound, so exact sums are only formed where rounding could matter.
 
 use super::evaluate::HalfSpace;
 use crate::arithmetic::combinations;
 
-/// A result in f64 errs by less than this part of its size. No sum below has
-/// a longer history than coefficients rounded twice, five products and six
-/// sums: some 12 units of epsilon.
+/// Error of an f64 result, relative to its size.
+///
+/// No sum below has a longer history than coefficients rounded twice, five products and six sums:
+/// some 12 units of epsilon.
 const ERROR: f64 = 32.0 * f64::EPSILON;
 
-/// Most that underflow may add; never near a product of at most eight f32 numbers
-/// that matters here (those of five are above 2^-745).
+/// Upper bound of the underflow.
+///
+/// Never near a relevant product of at most eight f32 numbers (those of five are above 2^-745).
 const UNDERFLOW: f64 = 1e-290;
 
-/// A result with the sum of the magnitudes that it came from.
+/// A result with the sum of the magnitudes it came from.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Rough {
     pub value: f64,
@@ -51,7 +52,7 @@ impl Rough {
         ERROR * self.size + UNDERFLOW
     }
 
-    /// The sign, if it is certain. Nothing but products with zero is zero.
+    /// Sign, if it is certain; zero only for products with zero.
     pub fn sign(self) -> Option<i32> {
         match self.value.abs() > self.error() {
             true => Some(if self.value > 0.0 { 1 } else { -1 }),
@@ -71,7 +72,7 @@ fn cross(a: &Vector, b: &Vector) -> Vector {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i].times(b[j]).plus(a[j].times(b[i]).negated()))
 }
 
-/// Returns whether weights could all be strictly of one sign.
+/// Returns `true` if all weights may be strictly of one sign.
 pub(super) fn may_agree<const N: usize>(weights: [Rough; N]) -> bool {
     let signs = weights.map(Rough::sign);
     let certain = |sign: i32| signs.contains(&Some(sign));
@@ -79,22 +80,22 @@ pub(super) fn may_agree<const N: usize>(weights: [Rough; N]) -> bool {
     !hopeless
 }
 
-/// Returns whether weights are certainly all strictly of one sign.
+/// Returns `true` if all weights are certainly strictly of one sign.
 fn agree<const N: usize>(weights: [Rough; N]) -> bool {
     let sign = weights[0].sign();
     sign.is_some_and(|s| s != 0) && weights.iter().all(|w| w.sign() == sign)
 }
 
-/// A bound of the volume along an axis, between two numbers.
+/// Interval of a bound of the volume along an axis.
 pub(super) struct RoughBound {
-    /// Twice the axis, plus one if it looks down.
+    /// Twice the axis, plus one for the negative direction.
     pub direction: usize,
-    /// The offset over the length of the normal lies between these.
+    /// Lower end of the interval of the offset over the normal's length.
     pub low: f64,
     pub high: f64,
 }
 
-/// Half-spaces in f64 with the cross products of all pairs of normals.
+/// Half-spaces in f64, with the cross products of all pairs of normals.
 pub(super) struct RoughSpaces {
     normals: Vec<Vector>,
     offsets: Vec<Rough>,
@@ -133,9 +134,9 @@ impl RoughSpaces {
         self.determinants[(i * self.normals.len() + j) * self.normals.len() + l]
     }
 
-    /// The sign of the offset of a combination of four that leaves no normal.
+    /// Sign of the offset of a combination of four with a zero normal.
     ///
-    /// `None` if it is not certain; positive also if there is no such combination.
+    /// `None` if it is uncertain; positive also if there is no such combination.
     pub fn quadruple(&self, [i, j, l, m]: [usize; 4]) -> Option<i32> {
         let weights = [
             self.determinant(j, l, m),
@@ -156,12 +157,12 @@ impl RoughSpaces {
         offset.sign().filter(|&sign| sign != 0)
     }
 
-    /// The weights of three constraints that leave one axis only.
+    /// Weights of three constraints whose combination has a normal along one axis.
     pub fn weights_of_triple(&self, [i, j, l]: [usize; 3], axis: usize) -> [Rough; 3] {
         [(j, l), (l, i), (i, j)].map(|(a, b)| self.cross(a, b)[axis])
     }
 
-    /// The bound of a combination of three along an axis.
+    /// Bound along an axis from a combination of three.
     ///
     /// `None` if rounding hides too much of it.
     pub fn bound(&self, triple: [usize; 3], axis: usize) -> Option<RoughBound> {
@@ -169,7 +170,7 @@ impl RoughSpaces {
         let [i, j, l] = triple;
         let determinant = self.determinant(i, j, l);
         let length = determinant.value.abs();
-        // Twice: the division below asks for a margin of its own.
+        // Twice, as the division below needs a margin too.
         if !(length > 2.0 * determinant.error() && agree(weights)) {
             return None;
         }
@@ -188,7 +189,7 @@ impl RoughSpaces {
         })
     }
 
-    /// Returns whether the line in which two boundaries meet surely misses the volume.
+    /// Returns `true` if the common line of two planes certainly misses the volume.
     ///
     /// On the line, in homogeneous coordinates, every other constraint is `a + t*b >= 0`.
     pub fn edge_misses(&self, i: usize, j: usize) -> bool {
@@ -215,7 +216,7 @@ impl RoughSpaces {
             if !most.is_finite() || slope <= error {
                 continue;
             }
-            // The weakest bound of t that the errors allow.
+            // Weakest bound of t that the errors allow.
             let error = if most >= 0.0 { -error } else { error };
             let reach = most / (slope + error);
             let reach = reach + reach.abs() * SLACK;
@@ -225,7 +226,7 @@ impl RoughSpaces {
                 to = to.min(reach);
             }
         }
-        // A plane that hardly leans along the line must hold at both ends together.
+        // A plane almost parallel to the line must hold at both ends together.
         let fails = |(most, b): (f64, Rough)| {
             [from, to].into_iter().all(|t| {
                 let change = t * b.value;
@@ -265,8 +266,8 @@ mod tests {
         ]);
         for i in 0..6 {
             for j in i + 1..6 {
-                // Opposite sides meet in front of the near plane; near and far
-                // do not meet, and that is not for this filter to say.
+                // Opposite sides meet in front of the near plane. Near and far do not meet, which
+                // is not for this filter to decide.
                 let opposite = (i, j) == (0, 1) || (i, j) == (2, 3);
                 assert_eq!(frustum.edge_misses(i, j), opposite, "{i} {j}");
             }
@@ -275,7 +276,7 @@ mod tests {
 
     #[test]
     fn an_edge_that_touches_in_one_point_is_kept() {
-        // A pyramid; two of its faces that are not neighbours meet in its tip.
+        // A pyramid; two of its faces that are not neighbours meet at its tip.
         let mut pyramid = vec![
             [1.0, 0.0, -1.0, 0.0],
             [-1.0, 0.0, -1.0, 0.0],
@@ -283,12 +284,12 @@ mod tests {
             [0.0, -1.0, -1.0, 0.0],
         ];
         assert!(!spaces(&pyramid).edge_misses(0, 1));
-        // With its tip cut off by the least that f64 can tell for certain.
+        // Its tip is cut off by the least amount that f64 resolves with certainty.
         pyramid.push([0.0, 0.0, -1.0, -1e-12]);
         assert!(spaces(&pyramid).edge_misses(0, 1));
     }
 
-    /// Certain bounds hold the true ratio, however ill-conditioned.
+    /// Certain bounds contain the true ratio, however ill-conditioned.
     #[test]
     fn the_true_bound_lies_within_the_doubt() {
         let mut state = 1u64;

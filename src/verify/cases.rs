@@ -1,8 +1,8 @@
-//! Scenes and volumes that are unpleasant: degenerate, random, of every kind.
+//! Difficult scenes and volumes: degenerate ones, random ones, of every kind.
 //!
-//! Degenerate scenes with volumes that touch their boxes exactly where they can; random
-//! differential cases, each of which is its seed, so that any failure is one number; one
-//! camera with every kind of volume.
+//! Degenerate scenes come with volumes that touch their boxes exactly if they can. A random
+//! differential case is given by its seed, so any failure is one number. One camera yields every
+//! kind of volume.
 
 use glam::{DVec3, Vec3};
 
@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, ConvexVolume, Plane, PlaneF64};
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 
-/// The volumes that cases are drawn from.
+/// Kinds of volumes from which cases are drawn.
 pub const VOLUME_KINDS: [&str; 9] = [
     "perspective",
     "infinite far",
@@ -25,23 +25,23 @@ pub const VOLUME_KINDS: [&str; 9] = [
     "empty",
 ];
 
-/// One scene with one volume and one point.
+/// A scene with one volume, one point and one region.
 #[derive(Clone, Debug)]
 pub struct RandomCase {
     /// Boxes, some of them inverted.
     pub items: Vec<Aabb>,
-    /// Planes to be culled by.
+    /// Volume to cull by.
     pub volume: ConvexVolume,
     /// Index into [`VOLUME_KINDS`].
     pub kind: usize,
-    /// A point to be located among the items.
+    /// Point to be located among the items.
     pub point: Vec3,
-    /// To be searched by: the items that overlap it.
+    /// Region to search: the items that overlap it.
     pub region: Aabb,
 }
 
 impl RandomCase {
-    /// The case of a seed; the same on every machine.
+    /// Case of a seed; the same on every machine.
     pub fn new(seed: u64) -> RandomCase {
         let mut rng = SeededRng::new(seed ^ 0xC011_BE7C);
         let scale = libm::exp2((rng.below(41) as f64) - 20.0);
@@ -49,7 +49,7 @@ impl RandomCase {
         let items: Vec<Aabb> = (0..count).map(|_| item(&mut rng, scale)).collect();
         let kind = rng.below(VOLUME_KINDS.len());
         let volume = loop {
-            // A drawn camera may be impossible (up along the view): again.
+            // A random camera may be impossible (up along the view): draws another.
             if let Some(volume) = volume(&mut rng, kind, scale, &items) {
                 break volume;
             }
@@ -68,13 +68,13 @@ impl RandomCase {
         }
     }
 
-    /// The items that overlap the region, by the six comparisons.
+    /// Items that overlap the region, by the six comparisons.
     pub fn overlapping(&self) -> impl Iterator<Item = ItemId> {
         scan(&self.items, |b| !b.is_empty() && self.region.intersects(b))
     }
 }
 
-/// A point on a coarse grid half of the time: exact ties are the point.
+/// A random point, half of the time on a coarse grid so that exact ties occur.
 fn grid_point(rng: &mut SeededRng, scale: f64) -> Vec3 {
     let on_grid = rng.unit() < 0.5;
     let p = (rng.point() * 2.0 - 1.0) * 8.0;
@@ -105,8 +105,8 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
     match kind {
         0..=3 => camera_volume(rng, kind, scale, items),
         4 => {
-            // A perspective volume with its x sheared along y and z: opposite
-            // planes are no longer mirror images.
+            // A perspective volume with its x sheared along y and z: opposite planes are no longer
+            // mirror images.
             let straight = camera_volume(rng, 0, scale, items)?;
             let [a, b] = [(); 2].map(|()| rng.between(-1.0, 1.0) as f32);
             ConvexVolume::from_planes(&sheared(straight.planes(), [a, b])).ok()
@@ -118,7 +118,7 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
         6 => planes(rng, 12, scale),
         7 => planes(rng, 31, scale),
         _ => {
-            // Two half-spaces that face away from each other, or none at all.
+            // Two half-spaces that face away from each other, or a plane that no point satisfies.
             let normal = rng.normal3().as_vec3();
             let gap = (scale * rng.unit()) as f32;
             let impossible = [Plane::new(Vec3::ZERO, -1.0)];
@@ -130,15 +130,16 @@ fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Optio
     }
 }
 
-/// Planes whose x is sheared along y and z.
+/// Shears planes: x along y and z.
 pub fn sheared(planes: &[Plane], [a, b]: [f32; 2]) -> Vec<Plane> {
     let shear = |n: Vec3| Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x);
     let planes = planes.iter();
     planes.map(|p| Plane::new(shear(p.normal), p.d)).collect()
 }
 
-/// Planes near the middle of the scene, facing it more often than not; some
-/// axis-parallel, some through grid points, so that boxes touch them.
+/// Random planes near the middle of the scene, most of them facing it.
+///
+/// Some are axis-parallel and some pass through grid points, so that boxes touch them.
 fn planes(rng: &mut SeededRng, count: usize, scale: f64) -> Option<ConvexVolume> {
     let planes = (0..count).map(|_| {
         let axis = [Vec3::X, Vec3::Y, Vec3::Z][rng.below(3)];
@@ -200,7 +201,7 @@ fn row(count: u16, scale: f32) -> Vec<Aabb> {
 
 /// Degenerate scenes with their names.
 ///
-/// Nothing, points, coincident and nested boxes, extreme sizes and places, inverted boxes.
+/// No items, points, coincident and nested boxes, extreme sizes and positions, inverted boxes.
 pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     let needle = |i: u16| {
         let at = f32::from(i) * 0.01;
@@ -263,16 +264,16 @@ pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
             sets.extend([vec![low], vec![high], vec![low, high]]);
         }
     }
-    // Planes that overflow f32 are no volume.
+    // Planes that overflow f32 make no volume.
     let volumes = sets.iter().map(|planes| ConvexVolume::from_planes(planes));
     volumes.filter_map(Result::ok).collect()
 }
 
 /// Points on the faces of a camera's view, as near as f32 has them.
 ///
-/// A rounding that is not the usual one, or a missing epsilon, puts them on the other side.
-/// For each face points all over the view (the R3 sequence of Roberts 2018), moved onto it,
-/// along the line of sight where it ends there; faces and points are about `origin`.
+/// An unusual rounding, or a missing epsilon, puts them on the wrong side. For each face, points
+/// all over the view (the R3 sequence of Roberts 2018) are moved onto it, along the line of sight
+/// if that ends there; faces and points are relative to `origin`.
 pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Vec<Aabb> {
     const EACH: u32 = 48;
     const STEP: DVec3 = DVec3::new(
@@ -284,7 +285,7 @@ pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Ve
     let (eye, near) = (frame.eye - origin, lens.near());
     let far = lens.far().unwrap_or(near.abs() * 1000.0);
     let [left, right, bottom, top] = match lens.matrix() {
-        // Sheared or oblique: no window of its own.
+        // A sheared or oblique matrix has no window of its own.
         Some(_) => [-1.0, 1.0, -0.5, 0.5],
         None => lens.window(),
     };
@@ -315,10 +316,10 @@ pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Ve
     points
 }
 
-/// Volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind.
+/// Volumes of all [`VOLUME_KINDS`] at a camera's position, with their kind.
 ///
-/// Kinds whose planes do not fit f32 are left out; `seed` picks how many planes an
-/// unbounded volume keeps.
+/// Leaves out kinds whose planes do not fit f32; `seed` determines how many planes an unbounded
+/// volume keeps.
 ///
 /// # Errors
 /// The camera's own planes do not fit f32.
@@ -328,8 +329,8 @@ pub fn variants(
     around: &Surroundings,
     seed: usize,
 ) -> Result<Vec<(&'static str, ConvexVolume)>, CameraError> {
-    // Both may lie behind the eye of an orthographic lens, of no other; those of a matrix
-    // may be one number once they are rounded.
+    // Both may lie behind the eye of an orthographic lens, but of no other; those of a matrix may
+    // round to the same number.
     let (near, far) = match (camera.lens.near(), camera.lens.far()) {
         (near, Some(far)) if near > 0.0 && near < far => (near, far),
         (near, _) if near > 0.0 => (near, near * 1000.0),
@@ -349,7 +350,7 @@ pub fn variants(
     let meeting = meeting.as_ref().map_or(&planes[..], ConvexVolume::planes);
     let twelve = planes.iter().chain(meeting).copied();
     let many = twelve.clone().cycle().take(31).enumerate().map(|(i, p)| {
-        // The same planes again, each a little farther out.
+        // The same planes again, each slightly farther out.
         Plane::new(p.normal, p.d + (i / 12) as f32 * 0.01 * far as f32)
     });
     // A matrix may have any number of planes.
@@ -417,7 +418,7 @@ mod tests {
         assert!(holds[..4].iter().all(|&h| h) && !holds[8], "{holds:?}");
     }
 
-    /// A lens that sees behind the eye, or there alone, has the other kinds too.
+    /// A lens that sees behind the eye, perhaps only there, has the other kinds too.
     #[test]
     fn planes_behind_the_eye_leave_the_other_kinds_whole() {
         let frame = look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();

@@ -1,7 +1,7 @@
-//! Cross-checking structures: the reference answer, and the comparison with it.
+//! Cross-checks of structures: the reference answer, and comparisons with it.
 //!
-//! The reference is the plainest loop there is; the first difference is put in words. Random
-//! and degenerate scenes and volumes are in `cases`, the contract of a structure as tests in
+//! The reference is a linear loop; the first difference is described in words. Random and
+//! degenerate scenes and volumes are in `cases`, the contract of a structure as tests in
 //! [`conformance`]. Nothing here is timed.
 
 mod cases;
@@ -21,22 +21,22 @@ pub use cases::{RandomCase, VOLUME_KINDS, edge_scenes, edge_volumes, points_on_f
 pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 
-/// Answer of the plainest loop: the ids of the items that satisfy a test.
+/// Reference answer: the ids of the items that satisfy a test, by a linear loop.
 pub fn scan(items: &[Aabb], sees: impl Fn(&Aabb) -> bool) -> impl Iterator<Item = ItemId> {
     let seen = items.iter().zip(0..).filter(move |(b, _)| sees(b));
     seen.map(|(_, id)| id)
 }
 
-/// How a structure's answer differs from the reference.
+/// Difference between a structure's answer and the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Difference {
-    /// Wanted by the reference, not returned (false negatives).
+    /// Items of the reference that were not returned (false negatives).
     pub missing: usize,
-    /// Returned, not wanted.
+    /// Returned items that are not in the reference.
     pub extra: usize,
-    /// Returned a second time, or an id that does not exist.
+    /// Repeated items, and ids that do not exist.
     pub invalid: usize,
-    /// The first item concerned.
+    /// First differing item.
     pub first: Option<ItemId>,
 }
 
@@ -54,10 +54,10 @@ impl fmt::Display for Difference {
     }
 }
 
-/// The verdict of a volume about one box in words.
+/// Describes a view's verdict about one box.
 ///
-/// Each plane that matters with the value of the box's p-vertex, so that a reader can check
-/// by hand.
+/// For a volume of f32 planes it gives the plane with the lowest p-vertex value, so that a reader
+/// can check by hand.
 pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> String {
     let view = view.into();
     let [low, high] = [b.min, b.max].map(|v| format!("({}, {}, {})", v.x, v.y, v.z));
@@ -85,7 +85,7 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> Strin
     )
 }
 
-/// The same for region search.
+/// Describes whether a box contains a point, for region search.
 pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
     let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
     let holds = ["does not hold", "holds"][usize::from(b.contains_point(p))];

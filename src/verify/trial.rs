@@ -1,40 +1,40 @@
-//! A trial: one question with its right answer, put to several structures.
+//! Trial: one query with its correct answer, put to several structures.
 //!
-//! It guards against panics, compares with the reference, and names the first item that
-//! differs. `run`, `verify`, `precision` and `stress` ask in no other way.
+//! Catches panics, compares with the reference, and names the first item that differs. `run`,
+//! `verify`, `precision` and `stress` query structures only through it.
 
 use super::{Difference, scan};
 use crate::geometry::Aabb;
 use crate::index::{IdSet, caught};
 use crate::query::{AnyVolume, ItemId};
 
-/// A fault of an answer.
+/// Fault of an answer.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Fault {
-    /// The structure panicked; its message.
+    /// The structure panicked with this message.
     Panicked(String),
-    /// The answer is not the reference's.
+    /// The answer differs from the reference.
     Differs(Difference),
 }
 
-/// One question at a time; the memory serves all of them.
+/// One query at a time, with memory that is reused.
 ///
-/// The reference is each box against each plane with [`AnyVolume::sees`]: no structure, no
-/// mask, no early way out.
+/// The reference tests each box against each plane with [`AnyVolume::sees`], without structure,
+/// masks or early exit.
 #[derive(Clone, Default, Debug)]
 pub struct Trial {
     items: usize,
     right: IdSet,
-    /// Number of items of the right answer.
+    /// Number of items in the correct answer.
     pub expected: usize,
-    /// The last answer, right or wrong.
+    /// The last answer, correct or not.
     pub answer: Vec<ItemId>,
-    /// Items of the right answer that are in the structure's.
+    /// Correct items found in the structure's answer.
     found: IdSet,
 }
 
 impl Trial {
-    /// A trial for queries of `items` items.
+    /// Trial for queries of `items` items.
     pub fn new(items: usize) -> Trial {
         Trial {
             items,
@@ -43,7 +43,7 @@ impl Trial {
         }
     }
 
-    /// Sets the question: the items that a view sees, by the reference scan.
+    /// Sets the query to the items that a view sees, by the reference scan.
     ///
     /// O(items * planes).
     pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
@@ -51,7 +51,7 @@ impl Trial {
         self.expect(scan(items, |b| view.sees(b)));
     }
 
-    /// A question whose right answer is known: ids below the number of items.
+    /// Sets the query by its correct answer, ids below the number of items.
     pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
         self.right.clear(self.items);
         self.expected = 0;
@@ -61,12 +61,12 @@ impl Trial {
         }
     }
 
-    /// Puts the question to a structure, which appends its answer to an empty list.
+    /// Queries a structure, which appends its answer to an empty list.
     ///
-    /// O(answer + items / 64) if it is right.
+    /// O(answer + items / 64) if the answer is correct.
     ///
     /// # Errors
-    /// A panic, or how the answer differs.
+    /// A panic, or the difference of the answer.
     pub fn ask(&mut self, ask: impl FnOnce(&mut Vec<ItemId>)) -> Result<&[ItemId], Fault> {
         self.answer.clear();
         caught(|| ask(&mut self.answer)).map_err(Fault::Panicked)?;
@@ -107,9 +107,9 @@ impl Trial {
 }
 
 impl Fault {
-    /// The fault in words.
+    /// Describes the fault.
     ///
-    /// `explain` says why an item is in the right answer or not.
+    /// `explain` states why an item is in the correct answer or not.
     pub fn explained(&self, explain: impl FnOnce(usize) -> Option<String>) -> String {
         match self {
             Fault::Panicked(message) => format!("panicked: {message}"),
@@ -146,7 +146,7 @@ mod tests {
             panicked,
             Err(Fault::Panicked("deep in a peer's code".to_owned()))
         );
-        // One that failed leaves nothing behind for the next.
+        // A failed query leaves no state for the next.
         assert!(trial.ask(|out| out.extend([1, 3])).is_ok());
     }
 }

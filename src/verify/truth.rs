@@ -1,7 +1,7 @@
-//! The truth about a scene and a camera, item by item.
+//! Truth about a scene and a camera, item by item.
 //!
-//! Also how an answer differs from it: false negatives, dropped touches, false positives. The
-//! verdicts are the oracle's; nothing is timed here.
+//! Also measures how an answer differs from it: false negatives, dropped touches, false positives.
+//! The verdicts come from the oracle; nothing is timed here.
 
 use crate::camera::Camera;
 use crate::geometry::Aabb;
@@ -11,17 +11,17 @@ use crate::scene::{Originals, Scene, WorldBox};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// The verdict about every item of a scene, for one camera.
+/// Verdicts about all items of a scene, for one camera.
 pub struct Truth {
-    /// About the items as they are stored.
+    /// Oracle about the items as stored.
     oracle: Oracle,
-    /// Oracle about the boxes as they were written, in the world.
+    /// Oracle about the boxes as written, in world coordinates.
     ///
-    /// `None` where the stored boxes are the same.
+    /// `None` if the stored boxes are the same.
     written: Option<(Oracle, Originals)>,
-    /// About every item, by id.
+    /// Verdicts by item id.
     pub verdicts: Vec<Verdict>,
-    /// Counts of the visible items, and no errors yet.
+    /// Counts of the visible items, without errors.
     pub visible: ErrorCount,
 }
 
@@ -72,18 +72,18 @@ impl ErrorCount {
         (self.visible > 0).then(|| self.false_positives as f64 / self.visible as f64)
     }
 
-    /// Visible items that were not returned.
+    /// Number of visible items that were not returned.
     pub fn dropped(&self) -> u64 {
         self.false_negatives + self.touch_dropped
     }
 
-    /// False positives that are neither the storage's nor the planes'.
+    /// False positives caused neither by storage nor by the planes.
     pub fn by_test(&self) -> u64 {
         let others = self.by_storage.saturating_add(self.by_planes);
         self.false_positives.saturating_sub(others)
     }
 
-    /// False negatives in a million visible items.
+    /// False negatives per million visible items.
     pub fn false_negative_ppm(&self) -> Option<f64> {
         (self.visible > 0).then(|| self.false_negatives as f64 / self.visible as f64 * 1e6)
     }
@@ -112,21 +112,21 @@ impl std::iter::Sum for ErrorCount {
 }
 
 impl Truth {
-    /// Camera level: the camera's numbers are exact, items are boxes about `origin`.
+    /// Truth at camera level: exact camera, items as boxes relative to `origin`.
     ///
-    /// O(items), some 50 ns each. `None` if the pose makes no frame.
+    /// O(items), some 50 ns each. `None` if the pose has no frame.
     pub fn of_camera(camera: &Camera, origin: DVec3, items: &[Aabb]) -> Option<Truth> {
         Truth::of_written(camera, origin, items, &Originals::default())
     }
 
-    /// Camera level, about the boxes of a scene as they were written.
+    /// Truth at camera level about the boxes of a scene as written.
     ///
-    /// O(items). `None` if the pose makes no frame.
+    /// O(items). `None` if the pose has no frame.
     pub fn of_scene(camera: &Camera, scene: &Scene) -> Option<Truth> {
         Truth::of_written(camera, scene.origin, &scene.items, &scene.originals)
     }
 
-    /// The same about items that may have moved, about `origin`, and as written.
+    /// Truth about items that may have moved, as written; `items` are about `origin`.
     pub fn of_written(
         camera: &Camera,
         origin: DVec3,
@@ -161,7 +161,7 @@ impl Truth {
         truth
     }
 
-    /// How deep item `id` reaches into the volume, as it was written.
+    /// Depth of item `id`, as written, in the volume.
     pub fn depth(&self, id: usize, item: &Aabb) -> f64 {
         match self.as_written(id) {
             Some((world, b)) => world.depth_wide(b.min, b.max),
@@ -169,20 +169,20 @@ impl Truth {
         }
     }
 
-    /// The box of an item as it was written, with the oracle of such boxes.
+    /// Box of an item as written, with the oracle for such boxes.
     ///
-    /// `None` where f32 has not changed it.
+    /// `None` if f32 represents the box exactly.
     fn as_written(&self, id: usize) -> Option<(&Oracle, &WorldBox)> {
         let (world, originals) = self.written.as_ref()?;
         Some((world, originals.of_item(id)?))
     }
 
-    /// The box of item `id` as it was written, where f32 has changed boxes.
+    /// Box of item `id` as written; `None` if f32 represents it exactly.
     pub fn original(&self, id: usize) -> Option<&WorldBox> {
         Some(self.as_written(id)?.1)
     }
 
-    /// Every item of the truth: its id, its verdict, and whether it is in the answer.
+    /// All items: id, verdict, and whether the answer contains the item.
     pub fn answered(&self, answer: &[ItemId]) -> impl Iterator<Item = (usize, Verdict, bool)> {
         let mut returned = vec![false; self.verdicts.len()];
         answer.iter().for_each(|&id| returned[id as usize] = true);
@@ -190,7 +190,7 @@ impl Truth {
         items.map(|(id, (&verdict, returned))| (id, verdict, returned))
     }
 
-    /// Items that are in and not in the answer, each with its depth in the volume.
+    /// Items that are in but missing in the answer, with their depths in the volume.
     ///
     /// World units. O(items).
     pub fn misses(&self, items: &[Aabb], answer: &[ItemId]) -> Vec<(ItemId, f64)> {
@@ -200,9 +200,9 @@ impl Truth {
         deep.collect()
     }
 
-    /// The errors of an answer about the very items the truth was made of.
+    /// Errors of an answer about the same items as the truth.
     ///
-    /// The answer in any order, no id twice. O(items).
+    /// The answer may be in any order, but without duplicates. O(items).
     pub fn errors(&self, items: &[Aabb], answer: &[ItemId]) -> ErrorCount {
         let mut count = self.visible;
         for (id, verdict, returned) in self.answered(answer) {
@@ -258,12 +258,12 @@ mod tests {
         assert_eq!(poor.false_negatives, 1);
         assert_eq!((poor.touch_dropped, poor.false_positives), (1, 2));
         assert_eq!((poor.worst_miss, poor.worst_excess), (6.0, 4.0));
-        // This volume's only plane drops both.
+        // This volume's only plane excludes both.
         assert_eq!((poor.by_storage, poor.by_planes, poor.by_test()), (0, 2, 0));
         assert!((poor.false_negative_ppm().unwrap() - 1e6 / 3.0).abs() < 1e-6);
     }
 
-    /// The first box lies outside a plane by less than f64 tells.
+    /// The first box lies outside a plane by less than f64 resolves.
     #[test]
     fn excess_is_put_down_to_planes_by_exact_sums() {
         let rows = [
@@ -285,8 +285,9 @@ mod tests {
         assert_eq!((all.by_storage, all.by_planes), (0, 1));
     }
 
-    /// Boxes of some metres beside a camera 1e11 m away from zero, where f32
-    /// has steps of 8 km: stored they are visible, written they are not.
+    /// Boxes of some metres near a camera 1e11 m from the origin.
+    ///
+    /// There f32 has steps of 8 km: the stored boxes are visible, the written ones are not.
     #[test]
     fn storage_is_an_error_of_its_own() {
         let far_away = DVec3::new(1e11, 0.0, 0.0);
@@ -309,7 +310,7 @@ mod tests {
             all.worst_excess > 20.0 && all.worst_excess < 60.0,
             "{all:?}"
         );
-        // By the stored boxes all three are visible: that is not the truth.
+        // As stored, all three boxes are visible, unlike the written ones.
         let stored = Truth::of_camera(&camera, scene.origin, &scene.items).unwrap();
         assert_eq!(stored.errors(&scene.items, &[0, 1, 2]).false_positives, 0);
     }

@@ -1,7 +1,7 @@
 //! Properties of views, of region search, of refits and of declared capabilities.
 //!
-//! A structure is queried with each kind of view, and with one point and many; it is
-//! refitted, or built again where it declines; it can do what it declares, and nothing else.
+//! A structure is queried with each kind of view, and with one point and many. It is refitted, or
+//! rebuilt if it declines. It must have exactly the capabilities that it declares.
 
 use glam::Vec3;
 
@@ -17,7 +17,7 @@ use crate::threads::Pool;
 ///
 /// For every kind of [`QueryVolume`], over the items and over the cubes of their spheres.
 pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
-    // Queries with every kind of view of some of the volumes.
+    // Queries every kind of view of some of the volumes.
     let some = |step, most| {
         move |asked: &mut Questions, index: &mut T| {
             let cubes = cubes(asked);
@@ -25,7 +25,7 @@ pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
             views_are_right(asked, index, &of_cubes, step, most)
         }
     };
-    // Every kind of plane set, not each of them at each of its places.
+    // Every kind of plane set, but not at every position.
     each(edges(), some(5, usize::MAX))?;
     each(cases(SEEDS), some(1, 1))?;
     each(generated_scenes(500)?, some(1, 3))
@@ -60,12 +60,12 @@ fn views_are_right<T: RegionIndex>(
         }
         right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
-        // A plane may leave f32 on its way to the eye.
+        // A plane relative to the eye may overflow f32.
         if let Ok(relative) = RelativeVolume::about(eye, volume) {
             right("planes about the eye", index, items, &relative)?;
         }
     }
-    // A box at either end, and all of them.
+    // The first and the last box, and the union of all.
     let ends = [items.first(), items.last()].into_iter().flatten().copied();
     let mut sought = ends.chain([Aabb::union_of(items)]);
     sought.try_for_each(|sought| {
@@ -75,7 +75,7 @@ fn views_are_right<T: RegionIndex>(
     })
 }
 
-/// Planes that are none of f32.
+/// Planes whose normals are not in f32.
 fn finer(volume: &ConvexVolume) -> Vec<PlaneF64> {
     let planes = volume.planes().iter().map(PlaneF64::from);
     let turned = planes.map(|p| PlaneF64::new(p.normal * (1.0 + 1e-9), p.d));
@@ -92,7 +92,7 @@ fn right<T: RegionIndex, Q: QueryVolume>(
     is_right(kind, index, items, view, why)
 }
 
-/// A point is answered with exactly the boxes that hold the point, bounds closed.
+/// Checks that a point query returns exactly the closed boxes that contain it.
 pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain(generated_scenes(500)?);
     each(scenes, |asked, index: &mut T| asked.locate_is_right(index))
@@ -100,8 +100,8 @@ pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
 
 /// Checks that `query_many` passes the ids of `query` for every point, in order.
 ///
-/// For batches of any size, with points that come again, lie on faces or outside, or are no
-/// numbers.
+/// For batches of any size, with points that are repeated, lie on faces or outside, or are not
+/// finite.
 pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain([cells()]);
     let scenes = scenes.chain(generated_scenes(500)?);
@@ -112,7 +112,7 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
             points.push(Vec3::splat(value));
             points.extend(asked.points.iter().take(4).map(|p| p.with_y(value)));
         }
-        // Neighbours in a batch, and far apart.
+        // Repeated points, next to each other in a batch and far apart.
         points.extend_from_within(points.len() / 2..);
         for count in [0, 1, 3, points.len()] {
             many_are_right(&asked.items, index, &points[..count.min(points.len())])?;
@@ -121,7 +121,7 @@ pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// Searches for a batch of points, by the portable and by the best kernel.
+/// Searches a batch of points with the portable and with the best kernel.
 fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) -> Outcome {
     let (mut trial, count) = (Trial::new(items.len()), points.len());
     for kernel in [Kernel::Portable, Kernel::best()] {
@@ -147,14 +147,15 @@ fn many_are_right<T: RegionIndex>(items: &[Aabb], index: &T, points: &[Vec3]) ->
     Ok(())
 }
 
-/// Cells that tile a block, with points within, on faces, edges and corners,
-/// and beside the block.
+/// Cells that tile a block, with points relative to it.
+///
+/// Points are inside, on faces, edges and corners, and outside of the block.
 fn cells() -> Questions {
     const SIDE: u16 = 11;
     let at = |x: u16, y: u16, z: u16| Vec3::from([x, y, z].map(f32::from));
     let grid = |i: u16| at(i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE);
     let items = (0..SIDE * SIDE * SIDE).map(|i| Aabb::new(grid(i), grid(i) + 1.0));
-    // Halves: every other coordinate is a face.
+    // Multiples of one half: every other coordinate is on a face.
     let points = (0..2 * SIDE * SIDE).map(|i| {
         let step = i.wrapping_mul(31);
         at(i % 23, step % 23, step / 23 % 25) * 0.5
@@ -167,8 +168,9 @@ fn cells() -> Questions {
     }
 }
 
-/// Brings an index up to date: by refitting where it can, else by building.
-/// An index that cannot must not have changed.
+/// Updates an index: refits it if it can, else rebuilds it.
+///
+/// An index that declines must not have changed.
 fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) -> Outcome {
     let before = asked.answers(index);
     if index.refit(&asked.items, moved) {
@@ -181,13 +183,13 @@ fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) ->
     Ok(())
 }
 
-/// Updates in a row, for what goes wrong at the twentieth.
+/// Consecutive updates, to reveal errors that accumulate.
 const MANY_UPDATES: usize = 50;
 
-/// Checks that a structure that refits answers as a newly built one.
+/// Checks that a refitted structure answers like a newly built one.
 ///
-/// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the other, and all
-/// of them far away: every view, and points one by one and many.
+/// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the other, and all of them
+/// far away: every view, and points one by one and many.
 pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = ["all the same", "needles", "inverted among sound"];
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
@@ -205,7 +207,7 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
                 let far = if at % 5 == 0 { 0.5 } else { 0.01 };
                 let by = (rng.normal3() * width * far + away).as_vec3();
                 let b = &mut asked.items[id as usize];
-                // Every third grows too.
+                // One in three grows too.
                 let grown = if at % 3 == 0 {
                     b.max - b.min
                 } else {
@@ -213,7 +215,7 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
                 };
                 *b = Aabb::new(b.min + by, b.max + by + grown.max(Vec3::ZERO));
             }
-            // In any order, and more than once.
+            // In any order, with a duplicate.
             let told: Vec<ItemId> = moved.iter().rev().chain(moved.first()).copied().collect();
             update(index, asked, &told)?;
             if !of_spheres[0].refit(&cubes(asked), &told) {
@@ -246,15 +248,15 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// An item that becomes empty is gone, and one that becomes sound is there.
+/// Checks that an emptied item disappears, and that one that becomes sound appears.
 pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
     let names = ["one", "coplanar", "inverted among sound", "only inverted"];
     let scenes = edges().filter(|asked| names.contains(&asked.scene.as_str()));
     each(scenes, |asked, _: &mut T| {
         let last = asked.items.len() as ItemId - 1;
         let all: Vec<ItemId> = (0..=last).collect();
-        // The first and the last turn about (a sound box becomes empty and
-        // the other way round) and back, then all of them at once.
+        // The first and then the last item are inverted (a sound box becomes empty and vice versa)
+        // and restored, then all at once.
         let steps = [vec![0], vec![0], vec![last], vec![last], all.clone(), all];
         for expected in [false, true] {
             let mut index: T = build_from(&Input::new(&asked.items).come_and_go(expected))?;
@@ -276,14 +278,13 @@ pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
 
 /// Checks the structure's [`Info`](crate::index::Info) against its behaviour.
 ///
-/// Items that move are taken over if the structure says that it refits, and declined if
-/// not; it has a tree order if it says so, and then answers in ranges of it are the
-/// reference set. A build looks at how many threads it may use if it says so, and answers
-/// the same with several.
+/// It accepts moved items if it declares refits, and declines them otherwise. It has a tree order
+/// if it declares one, and then answers in ranges of it are the reference set. A build reads the
+/// number of threads exactly if it declares a threaded build, and answers the same with several.
 pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
     let says = T::INFO;
     each(generated_scenes(500)?, |asked, index: &mut T| {
-        // Called by every run: they must not panic.
+        // Every run calls these: they must not panic.
         let _ = (index.chose(), index.cells().len());
         ensure(index.memory().item_bytes > 0, || {
             "memory() tells no bytes of items".to_owned()

@@ -1,8 +1,7 @@
-//! The properties of every structure, one function per property.
+//! Properties of every structure, one function per property.
 //!
-//! They are the properties of the contract in [`RegionIndex`].
-//! [`conformance!`](crate::conformance) makes a test of each; an error names the difference and
-//! the scene.
+//! They are the properties of the contract in [`RegionIndex`]. [`conformance!`](crate::conformance)
+//! makes a test of each; an error names the difference and the scene.
 
 mod behaviour;
 mod questions;
@@ -42,7 +41,7 @@ pub use behaviour::{
 /// ```
 #[macro_export]
 macro_rules! conformance {
-    // The one list of properties.
+    // The only list of properties.
     (@each $make:ident $structure:ty) => {
         $crate::conformance! { @$make $structure:
             reference_set_on_edge_scenes
@@ -73,9 +72,9 @@ macro_rules! conformance {
     };
 }
 
-/// A property of the contract: the name of its test, and the check.
+/// Property of the contract: the name of its test, and the check.
 ///
-/// `Err` says what differed, and on which scene.
+/// `Err` describes the difference and the scene.
 pub type Property = (&'static str, fn() -> Outcome);
 
 /// All properties for a structure, in the order of the list.
@@ -86,7 +85,7 @@ pub fn properties<T: RegionIndex>() -> &'static [Property] {
 /// Seeds of the random cases of each property.
 const SEEDS: Range<u64> = 0..64;
 
-/// Checks that `visible` returns what a look at every box returns.
+/// Checks that `visible` returns what a test of every box returns.
 ///
 /// In degenerate scenes, with planes that touch boxes.
 pub fn reference_set_on_edge_scenes<T: RegionIndex>() -> Outcome {
@@ -95,7 +94,7 @@ pub fn reference_set_on_edge_scenes<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// The same on [`RandomCase`](super::RandomCase)s, whose items stand in two orders.
+/// Checks `visible` on [`RandomCase`](super::RandomCase)s, items in two orders.
 pub fn reference_set_on_random_cases<T: RegionIndex>() -> Outcome {
     let four_times = SEEDS.start..SEEDS.end * 4;
     each(cases(four_times), |asked, index: &mut T| {
@@ -108,14 +107,14 @@ pub fn reference_set_on_random_cases<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// The same on small generated worlds, through cameras.
+/// Checks `visible` on small generated worlds, with cameras.
 pub fn reference_set_on_generated_scenes<T: RegionIndex>() -> Outcome {
     each(generated_scenes(1500)?, |asked, index: &mut T| {
         asked.visible_is_right(index)
     })
 }
 
-/// Passes the answer for the camera of a random case, or for its point, to a sink.
+/// Passes the answer for a case's first volume, or for its last point, to a sink.
 fn pass<T: RegionIndex, S: Sink>(
     index: &T,
     case: &Questions,
@@ -128,7 +127,7 @@ fn pass<T: RegionIndex, S: Sink>(
     }
 }
 
-/// The same items give the same structure: the same ids in the same order.
+/// Checks that the same items give the same ids in the same order.
 pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
         let same = asked.answers(index) == asked.answers(&build::<T>(&asked.items)?);
@@ -136,9 +135,9 @@ pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// Checks that a NaN or infinite bound makes the build fail and is named.
+/// Checks that a build fails and names the box if a bound is NaN or infinite.
 ///
-/// In any box and coordinate; of several, the first.
+/// In any box and coordinate; if there are several, the first.
 pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
     let cube = |i: u8| Aabb::around(Vec3::splat(f32::from(i)), Vec3::ONE);
     let sound: Vec<Aabb> = (0..40).map(cube).collect();
@@ -165,14 +164,14 @@ pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
     Ok(())
 }
 
-/// Checks that any sink gets the same ids, and a sink that breaks no further call.
+/// Checks that any sink gets the same ids, and that none is called after a break.
 ///
-/// A sink that breaks has what came first, and the query returns `Break`.
+/// A sink that breaks has received the first ids, and the query returns `Break`.
 pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
     each(cases(SEEDS), |asked, index: &mut T| {
         for region_search in [false, true] {
-            // Keeps the slices apart as they come, and breaks at a given call.
+            // Keeps the slices separate, and breaks at a given call.
             let until = |breaks_at: usize| {
                 let mut slices = Vec::new();
                 let mut sink = |ids: &[ItemId]| {

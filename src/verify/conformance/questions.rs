@@ -1,6 +1,6 @@
-//! Queries of the properties: volumes and points of a scene.
+//! Queries for the properties: volumes and points of a scene.
 //!
-//! Also the comparison of an answer with the reference.
+//! Also compares an answer with the reference.
 
 use std::ops::{ControlFlow, Range};
 
@@ -15,7 +15,7 @@ use crate::kernel::{Kernel, Plain};
 use crate::query::{ItemId, NoRecorder, QueryContext, QueryCost, QueryVolume, Recorder, Sink};
 use crate::scene;
 
-/// Why a property does not hold.
+/// Result of a property's check, with the reason why it fails.
 pub(super) type Outcome = Result<(), String>;
 
 pub(super) fn build<T: RegionIndex>(items: &[Aabb]) -> Result<T, String> {
@@ -26,7 +26,7 @@ pub(super) fn build_from<T: RegionIndex>(input: &Input) -> Result<T, String> {
     T::build(input, &T::Params::default()).map_err(|error| error.to_string())
 }
 
-/// Queries by the portable instruction set; `Break` if the sink broke off.
+/// Queries with the portable instruction set; `Break` if the sink broke off.
 pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
     index: &T,
     volume: &Q,
@@ -36,7 +36,7 @@ pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
     index.query(volume, &mut QueryContext::new(Plain, sink, recorder))
 }
 
-/// The answer in the structure's own order.
+/// Answer in the structure's own order.
 pub(super) fn seen<T: RegionIndex, Q: QueryVolume>(index: &T, volume: &Q) -> Vec<ItemId> {
     let mut ids = Vec::new();
     // A Vec never breaks off.
@@ -49,12 +49,12 @@ pub(super) fn sorted(mut ids: Vec<ItemId>) -> Vec<ItemId> {
     ids
 }
 
-/// `Err` with the words if it does not hold.
+/// Returns `Err` with the message unless the condition holds.
 pub(super) fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
     if holds { Ok(()) } else { Err(otherwise()) }
 }
 
-/// A scene and the queries of an index in it.
+/// A scene and the queries on it.
 pub(super) struct Questions {
     pub(super) scene: String,
     pub(super) items: Vec<Aabb>,
@@ -62,8 +62,9 @@ pub(super) struct Questions {
     pub(super) points: Vec<Vec3>,
 }
 
-/// Tests a property of a structure, built over each of the scenes. An error begins
-/// with the names of both.
+/// Checks a property of a structure that is built over each of the scenes.
+///
+/// An error begins with the names of both.
 pub(super) fn each<T: RegionIndex>(
     scenes: impl IntoIterator<Item = Questions>,
     mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
@@ -71,7 +72,7 @@ pub(super) fn each<T: RegionIndex>(
     each_of(&mut scenes.into_iter(), &mut holds)
 }
 
-/// Compiled once for each structure, not for each of its properties.
+/// Compiled once per structure, not once per property.
 fn each_of<T: RegionIndex>(
     scenes: &mut dyn Iterator<Item = Questions>,
     holds: &mut dyn FnMut(&mut Questions, &mut T) -> Outcome,
@@ -99,7 +100,7 @@ pub(super) fn edges() -> impl Iterator<Item = Questions> {
 
 /// The [`RandomCase`]s of some seeds, with derived volumes.
 ///
-/// The case's point is the last one.
+/// The last point is the case's own.
 pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
     seeds.map(|seed| {
         let (case, next) = (RandomCase::new(seed), RandomCase::new(seed + 1));
@@ -114,7 +115,7 @@ pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
     })
 }
 
-/// A volume cut by the planes of another, one about all items, one beside them.
+/// Intersection of two volumes, a volume around all items, and one beside them.
 fn derived(volume: &ConvexVolume, other: &ConvexVolume, items: &[Aabb]) -> Vec<ConvexVolume> {
     let bounds = Aabb::union_of(items);
     let reach = bounds.min.abs().max(bounds.max.abs()) * 2.0;
@@ -123,7 +124,8 @@ fn derived(volume: &ConvexVolume, other: &ConvexVolume, items: &[Aabb]) -> Vec<C
     let both = volume.planes().iter().chain(other.planes()).copied();
     let beside = vec![Plane::new(Vec3::X, -bounds.max.x.next_up())];
     let sets: [Vec<Plane>; 3] = [both.take(32).collect(), around.collect(), beside];
-    // Nothing lies around or beside no items, or items that reach half the largest number.
+    // Without items, or with items that reach half the largest float, there is none around or
+    // beside.
     let sets = sets.iter().filter(|set| set.iter().all(Plane::is_finite));
     sets.map(|planes| ConvexVolume::from_planes(planes).expect("32 finite planes at most"))
         .collect()
@@ -157,11 +159,11 @@ impl Questions {
     }
 }
 
-/// Tests that a structure returns exactly the items that the scan does; `explain`
-/// says why an item is in the answer or not.
+/// Checks that a structure returns exactly the items that the scan does.
 ///
-/// The best kernel and a counted query return the same ids; the latter tests or accepts
-/// with a subtree every item that it returns, and evaluates no plane twice.
+/// `explain` states why an item is in the answer or not. The best kernel and a counted query must
+/// return the same ids. The counts must include every returned item, as tested or accepted with a
+/// subtree, and at most one evaluation of each open plane per comparison.
 pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     kind: &str,
     index: &T,
@@ -201,7 +203,7 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     )
 }
 
-/// Corners and centres of some boxes, and points one step of a float beside.
+/// Corners and centres of some boxes, and points one float step outside.
 pub(super) fn points(items: &[Aabb]) -> Vec<Vec3> {
     let step = items.len().div_ceil(20).max(1);
     let of_box = |b: &Aabb| {
@@ -211,7 +213,7 @@ pub(super) fn points(items: &[Aabb]) -> Vec<Vec3> {
     items.iter().step_by(step).flat_map(of_box).collect()
 }
 
-/// Generated worlds with cameras around and within them.
+/// Generated worlds with cameras around and inside them.
 pub(super) fn generated_scenes(n: usize) -> Result<Vec<Questions>, String> {
     let load = |family: &scene::Family| {
         let source = format!("{}:n={n},seed=5", family.name);
@@ -234,7 +236,7 @@ fn camera_volumes(scene: &scene::Scene) -> Result<Vec<ConvexVolume>, CameraError
     let volume = |i: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / 8.0;
         let arm = DVec3::new(libm::cos(angle), libm::sin(angle), 0.3) * radius;
-        // From outside, from within, and close to the middle.
+        // From outside, from inside, and close to the centre.
         let eye = centre + arm * [1.2, 0.5, 0.05][i as usize % 3];
         let far = (i % 4 != 3).then_some(radius * [0.5, 1.0, 3.0][i as usize % 3]);
         let camera = Camera {
