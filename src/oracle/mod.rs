@@ -135,16 +135,14 @@ impl Oracle {
         }
     }
 
-    /// Depth of the box in the volume (positive), world units.
+    /// Depth of the box in the volume; if negative, the distance is at least its size.
     ///
-    /// Negative: a lower bound of its distance.
-    ///
-    /// The least value of any certificate of unit length, to a millionth of itself.
-    /// For a box that is IN this is the length of the shortest move that makes it
-    /// touch; for one that is OUT the widest gap that an axis of the separating axis
-    /// test shows, never more than the true distance (less where two corners are
-    /// nearest). Zero for a touch. Infinite for a volume without constraints, minus
-    /// infinity for an empty box or volume. O(certificates).
+    /// In world units: the least value of any certificate of unit length, to a millionth of
+    /// itself. For a box that is IN this is the length of the shortest move that makes it
+    /// touch. For a box that is OUT it is the negated widest gap on an axis of the separating
+    /// axis test, which is at most the true distance (less if two corners are nearest). Zero
+    /// for a touch, infinite for a volume without constraints, minus infinity for an empty box
+    /// or volume. O(certificates).
     ///
     /// ```
     /// # use cullbench::geometry::{Aabb, ConvexVolume, Plane};

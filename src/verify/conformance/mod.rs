@@ -27,8 +27,9 @@ pub use behaviour::{
     refit_equals_a_fresh_build, region_search_is_the_closed_box_scan,
 };
 
-/// Stamps one `#[test]` per property of the contract for a structure with its
-/// default parameters. The tests are named after the properties: two
+/// Generates one `#[test]` per property of the contract for a structure.
+///
+/// The structure has its default parameters. The tests are named after the properties, so two
 /// structures need two modules.
 ///
 /// ```
