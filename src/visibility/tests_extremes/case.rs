@@ -1,4 +1,4 @@
-//! A case of the occlusion stage: boxes, a camera, a buffer, and where to look.
+//! A case of the occlusion stage: boxes, a camera, a buffer and ray targets.
 
 use glam::DVec3;
 
@@ -6,12 +6,12 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
-/// Random rays of a case.
+/// Number of random rays per case.
 pub const RAYS: usize = 1_000;
 
-/// Resolutions of the occlusion buffers, coarse to that of a small image.
+/// Resolutions of the occlusion buffers, from coarse to that of a small image.
 ///
-/// At the coarse ones much falls between the samples.
+/// At the coarse ones much lies between the samples.
 const GRIDS: [SampleGrid; 4] = [
     SampleGrid::new(40, 25),
     SampleGrid::new(80, 45),
@@ -44,7 +44,7 @@ impl StageCase {
 
     /// Adds slivers: small boxes behind corners of other boxes.
     ///
-    /// An edge hides them entirely or all but a fraction of a pixel.
+    /// An edge hides them entirely or except for a fraction of a pixel.
     pub fn with_slivers(mut self, rng: &mut SeededRng) -> StageCase {
         let frame = &self.camera.frame;
         let of_boxes = self.boxes.len();
@@ -79,18 +79,18 @@ pub fn along_x(near: f64) -> Camera {
     looking(DVec3::ZERO, DVec3::X, lens)
 }
 
-/// A camera that looks along a direction beside the up vector z.
+/// A camera that looks along `forward`, with z up.
 pub fn looking(eye: DVec3, forward: DVec3, lens: Lens) -> Camera {
     let frame = Frame::looking_along(eye, forward, DVec3::Z).expect("a direction beside up");
     Camera { frame, lens }
 }
 
-/// A rectangle of a plane across x.
+/// A rectangle in a plane perpendicular to x.
 pub fn flat(x: f64, [left, right]: [f64; 2], [low, high]: [f64; 2]) -> WorldBox {
     WorldBox::new(DVec3::new(x, left, low), DVec3::new(x, right, high))
 }
 
-/// A share of an edge: anywhere, or next to one of its ends.
+/// A random fraction of an edge, often next to one of its ends.
 pub fn along(rng: &mut SeededRng) -> f64 {
     match rng.below(3) {
         0 => rng.unit(),

@@ -1,8 +1,8 @@
 //! Generated extremes of the region, occlusion and triangle stages.
 //!
-//! A back end with a guarantee must keep every item that an exact ray meets first.
-//! Cases: worlds full of contacts, far from the origin, by every kind of lens; gaps of a
-//! fraction of a pixel; faces that coincide or just miss each other; chains of portals.
+//! A back end with a guarantee must keep every item that an exact ray meets first. Cases: worlds
+//! full of contacts, far from the origin, with every kind of lens; gaps of a fraction of a pixel;
+//! faces that coincide or just miss each other; chains of portals.
 
 mod case;
 mod portals;
@@ -30,10 +30,10 @@ use portals::Chain;
 use triangles::TriangleCase;
 use worlds::Kind;
 
-/// Rays of a case at points of its boxes, most of them next to an edge.
+/// Number of rays per case at points of its boxes, mostly next to an edge.
 const RAYS_AT_BOXES: usize = 300;
 
-/// Extremes of one kind.
+/// A family of extreme cases.
 #[derive(Clone, Copy)]
 struct Family {
     /// Name in the ids of cases.
@@ -116,7 +116,7 @@ const VISIBILITY_FAMILIES: [Family; 21] = [
 /// The answer of one back end to one case.
 #[derive(Debug)]
 struct Row {
-    /// The case, read where a row is printed.
+    /// Id of the case, for messages.
     #[expect(dead_code, reason = "printed")]
     id: String,
     /// The back end.
@@ -126,7 +126,7 @@ struct Row {
     result: Result<(), String>,
 }
 
-/// Runs cases of a family with one kernel: a row per case and back end.
+/// Runs cases of a family with one kernel; returns a row per case and back end.
 fn rows_of(family: Family, cases: Range<u64>, seed: u64, kernel: Kernel) -> Vec<Row> {
     let mut rows = Vec::new();
     for case in cases {
@@ -165,7 +165,7 @@ type BackEnd = (
     Box<dyn Fn(&OccluderScene, &View, &[ItemId]) -> Vec<ItemId>>,
 );
 
-/// A buffer from front to back, and in two passes.
+/// Answers of a buffer, interleaved and in two passes.
 fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> [BackEnd; 2] {
     let walk: BackEnd = (
         name.to_owned(),
@@ -243,12 +243,12 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
     seen
 }
 
-/// A point of a box: on each axis anywhere, or next to an end.
+/// A point of a box: on each axis random, or next to an end.
 fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     b.min + (b.max - b.min) * DVec3::new(along(rng), along(rng), along(rng))
 }
 
-/// Checks that every visible item was kept and that every kept item is in view.
+/// Checks that every visible item is kept and that every kept item is in view.
 fn judged(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> Result<(), String> {
     kept.sort_unstable();
     let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
@@ -323,7 +323,7 @@ mod tests {
         }
     }
 
-    /// Every family finds items that buffers without a guarantee lose.
+    /// Every family has items that buffers without a guarantee lose.
     #[test]
     fn unsafe_rows_fail_where_safe_ones_pass() {
         let kernel = Kernel::best();

@@ -60,9 +60,9 @@ pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
 }
 
 impl Chain {
-    /// Rooms on the line of sight that the search does not list, and the search's name.
+    /// Rooms on the line of sight that the search misses, with the search's name.
     ///
-    /// Its openings are narrower than the real ones by `shrink` on each side. `None` if
+    /// The search's openings are narrower than the real ones by `shrink` on each side. `None` if
     /// exact arithmetic does not confirm that the line of sight passes the openings.
     pub fn lost(&self, shrink: f64) -> Option<(&'static str, Vec<u32>)> {
         let graph = RegionGraph::of_boxes(self.rooms.clone(), self.openings.clone());

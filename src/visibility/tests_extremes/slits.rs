@@ -48,7 +48,7 @@ fn bars(
     bars
 }
 
-/// A wall, and a small box behind each of its gaps.
+/// A wall with a small box behind each of its gaps.
 fn wall(rng: &mut SeededRng, mut boxes: Vec<WorldBox>, aims: Vec<DVec3>) -> StageCase {
     boxes.extend(aims.iter().map(|&aim| behind(rng, aim)));
     StageCase {
@@ -91,7 +91,7 @@ pub fn lattice(rng: &mut SeededRng) -> StageCase {
     let aims = (0..60).map(|_| {
         let y = columns[rng.below(columns.len())][1] + gaps[0] / 2.0;
         let z = rows[rng.below(rows.len())][1] + gaps[1] / 2.0;
-        // Through a slit, or where two of them cross.
+        // Through a slit, or through a crossing of two slits.
         match rng.below(3) {
             0 => DVec3::new(DISTANCE, y, rng.between(bottom, top)),
             1 => DVec3::new(DISTANCE, rng.between(left, right), z),
@@ -117,7 +117,7 @@ pub fn t_junctions(rng: &mut SeededRng) -> StageCase {
             let end = start + length;
             let crack = [0.0, end.abs() * f64::EPSILON, 1e-7, 1e-3][rng.below(4)];
             bricks.push(flat(DISTANCE, [start, end - crack], [low, low + height]));
-            // Along the seam, often right above the brick that it ends on.
+            // Along the seam, often just above the brick at which it ends.
             let up = [rng.unit(), rng.unit() * 1e-6][rng.below(2)];
             aims.push(DVec3::new(DISTANCE, end - crack / 2.0, low + height * up));
         }

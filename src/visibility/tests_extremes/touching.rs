@@ -61,7 +61,7 @@ pub fn eye_at_face(rng: &mut SeededRng) -> StageCase {
     eye[axis] = next_to(rng, face[axis]);
     let mut forward = rng.point() * 2.0 - 1.0 + DVec3::X * 1e-3;
     if rng.below(2) == 0 && axis != 2 {
-        // Along the face.
+        // Looks along the face.
         forward[axis] = 0.0;
         forward[1 - axis] = 1.0;
     }

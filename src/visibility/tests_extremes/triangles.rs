@@ -17,7 +17,7 @@ use crate::visibility::triangle::{
 use crate::visibility::truth::SurfaceIndex;
 use crate::visibility::{Ray, Rays};
 
-/// Triangles per mesh.
+/// Number of triangles per mesh.
 const OF_MESH: usize = 1_500;
 
 /// Input of the back ends under test.
@@ -32,7 +32,7 @@ pub struct TriangleCase {
 pub struct Lost {
     /// The back end.
     pub row: &'static TriangleRow,
-    /// Their numbers.
+    /// Indices of the triangles.
     pub triangles: Vec<u32>,
 }
 
@@ -125,7 +125,7 @@ struct Met {
     places: HashMap<[[u32; 3]; 3], Vec<(usize, u64)>>,
 }
 
-/// Bits of a triangle's corners, as a key of a map.
+/// Bits of a triangle's corners, as a map key.
 fn key(corners: [Vec3; 3]) -> [[u32; 3]; 3] {
     corners.map(|corner| corner.to_array().map(f32::to_bits))
 }

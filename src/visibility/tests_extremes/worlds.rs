@@ -23,8 +23,8 @@ pub fn contacts(rng: &mut SeededRng, far_out: f64, kind: Kind) -> StageCase {
 
 /// Boxes of any shape around a point `far_out` from the origin.
 ///
-/// In half of the worlds coordinates are whole numbers, so that faces coincide; in half
-/// of them most boxes stand on one floor.
+/// In half of the worlds coordinates are integers, so that faces coincide; in half of them most
+/// boxes stand on one floor.
 fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
     let [whole, standing] = [rng.below(2) == 0, rng.below(2) == 0];
     let about = DVec3::new(far_out, -far_out, 0.0);
@@ -59,7 +59,7 @@ fn camera(rng: &mut SeededRng, far_out: f64, kind: Kind) -> Camera {
     if rng.below(3) == 0 {
         forward.z = 0.0;
     }
-    // Never along the up vector.
+    // Never parallel to the up vector.
     forward.x += if forward.x.abs() < 1e-3 && forward.y.abs() < 1e-3 {
         1.0
     } else {

@@ -1,4 +1,4 @@
-//! Every row of the table against the exact truth.
+//! Comparison of every row of the table with the exact truth.
 
 mod audit;
 mod plain_cones;
@@ -14,18 +14,18 @@ use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
 use crate::scene::{Family, MESHES, SeededRng, Surfaces, load};
 
-/// Triangles in and out of a stage.
+/// Numbers of triangles before and after the stage.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 struct Counts {
-    /// Triangles that the stage was given.
+    /// Candidates of the stage.
     candidates: usize,
-    /// Triangles that it delivered.
+    /// Triangles that the stage returned.
     delivered: usize,
-    /// Triangles that it should have delivered.
+    /// Triangles that the stage should have returned.
     truth: usize,
-    /// Delivered, but not in the truth.
+    /// Returned, but not in the truth.
     false_positives: usize,
-    /// In the truth, but not delivered.
+    /// In the truth, but not returned.
     false_negatives: usize,
 }
 
@@ -42,7 +42,7 @@ impl Counts {
     }
 }
 
-/// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
+/// Scenes of some thousand triangles: all meshes, and boxes far from the origin.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {
     let mesh = |mesh: &Family| (mesh.name.to_string(), mesh.mesh(6000, 5));
     let boxes = ["city:n=200", "rooms:n=200", "uniform:n=100,offset=1e7"].map(|name| {
@@ -54,7 +54,7 @@ fn scenes() -> Vec<(String, Arc<Clusters>)> {
         .collect()
 }
 
-/// Cameras in and around a scene: three lenses in turn.
+/// Cameras in and around a scene, with three lenses in turn.
 fn cameras(clusters: &Clusters, count: usize, seed: u64) -> Vec<Camera> {
     let surfaces = Surfaces::clone(&clusters.surfaces);
     let scene = surfaces.into_scene("cameras").unwrap();
@@ -98,7 +98,7 @@ fn rows_keep_their_promises_and_kernels_agree() {
                     assert_eq!(other, kept, "{name} {} {kernel}", row.name);
                 }
                 assert_eq!(kept.without(&all), 0);
-                // What is taken away beforehand stays away, and changes nothing else.
+                // Triangles removed beforehand stay removed, and change nothing else.
                 let items = (0..clusters.surfaces.items() as u32).step_by(2);
                 let half = Selection::of_items(&clusters, items);
                 let mut rest = half.clone();
@@ -121,7 +121,7 @@ fn rows_keep_their_promises_and_kernels_agree() {
                 }
                 _ => {}
             }
-            // Where clusters are nearly flat, each row finds something to remove.
+            // If clusters are nearly flat, each row removes something.
             let removed = 1.0 - sum.delivered as f64 / sum.candidates as f64;
             let is_smooth = name == "mesh:spheres" || name == "mesh:statue";
             assert!(
@@ -144,7 +144,7 @@ fn adversarial_eyes_find_what_the_unsafe_rows_lose_and_nothing_else() {
             } else {
                 assert!(found.false_negatives > 10, "{what}");
             }
-            // A search that rejects nothing shows nothing.
+            // A search that rejects nothing proves nothing.
             assert!(found.rejected > 200, "{what}");
         }
     }

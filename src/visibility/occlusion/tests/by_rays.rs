@@ -1,4 +1,4 @@
-//! Items that random rays meet first, by brute force, and those that are lost.
+//! Items that random rays meet first, by brute force, and items that are lost.
 
 use glam::{DVec3, Vec3};
 
@@ -41,7 +41,7 @@ impl Ready {
         camera.volume(&PlaneOptions::default(), &around).unwrap()
     }
 
-    /// Items that no plane of the volume excludes; tests every item.
+    /// Items that no plane of the volume excludes, by testing every item.
     pub fn in_view(&self, volume: &ConvexVolume) -> Vec<ItemId> {
         let items = self.scene.items.iter().enumerate();
         let seen = items.filter(|(_, b)| volume.sees(b));
@@ -49,7 +49,7 @@ impl Ready {
     }
 }
 
-/// Depth at which a ray enters a box, if that is between near and far.
+/// Depth at which a ray enters a box, if it lies between near and far.
 pub fn entry(ray: &Ray, b: &WorldBox) -> Option<f64> {
     let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
@@ -87,8 +87,8 @@ pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
 
 /// Items that some of `count` rays meet first, in order.
 ///
-/// Every other ray is at a random point of the image; the rest aim at points of items,
-/// mostly close to their edges.
+/// Every other ray is at a random point of the image; the rest aim at points of items, mostly close
+/// to their edges.
 pub fn seen_by_rays(
     rays: &Rays,
     boxes: &[WorldBox],
@@ -128,7 +128,7 @@ pub fn missing(seen: &[ItemId], kept: &[ItemId]) -> Vec<ItemId> {
     lost.copied().collect()
 }
 
-/// Calls `ask` with the view of a camera.
+/// Calls `ask` with a camera's view.
 pub fn with_view<R>(
     ready: &Ready,
     camera: &Camera,
@@ -141,7 +141,7 @@ pub fn with_view<R>(
     ask(&view, &rays)
 }
 
-/// A point of a box, anywhere.
+/// A random point of a box.
 pub fn point_between(low: DVec3, high: DVec3, rng: &mut SeededRng) -> DVec3 {
     low + (high - low) * rng.point()
 }

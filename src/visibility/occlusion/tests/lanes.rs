@@ -1,6 +1,6 @@
-//! Sixteen boxes at once against each alone.
+//! Sixteen boxes at once compared with each box alone.
 //!
-//! Their rectangles hold the boxes, and asking for all of them is asking for each.
+//! Rectangles contain their boxes, and a query for all lanes equals a query for each.
 
 use glam::DVec3;
 
@@ -13,11 +13,10 @@ use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
 const GRID: SampleGrid = SampleGrid::new(320, 180);
-/// Pixels so fine that rounding of coordinates shows.
+/// Pixels so fine that the rounding of coordinates shows.
 const FINE: SampleGrid = SampleGrid::new(32_000, 18_000);
 
-/// Boxes before an eye that is so far from the scene's zero, all in scene-local
-/// coordinates.
+/// Boxes in front of an eye that is about `far_out` away from the scene's origin.
 fn before_eye(far_out: f64, seed: u64) -> (Ready, Frame) {
     let mut rng = SeededRng::new(seed);
     let eye = DVec3::new(far_out, 1.7 - far_out, far_out / 3.0);
@@ -48,7 +47,7 @@ fn lenses() -> [Lens; 3] {
     ]
 }
 
-/// The rectangles of all items, by blocks.
+/// Computes the rectangles of all items, block by block.
 struct Projected<'a>(&'a Ready, &'a View<'a>);
 
 impl Work for Projected<'_> {
@@ -86,7 +85,7 @@ fn rectangles_hold_every_corner_of_their_boxes() {
     }
 }
 
-/// Checks the lanes of a block; returns how many corners were in the image.
+/// Checks the lanes of a block; returns the number of corners in the image.
 fn corners_held(ready: &Ready, view: &View, block: usize, rects: &Rects) -> usize {
     let mut held = 0;
     let lanes = ready.occluders.lanes(0, block) & rects.flat;
@@ -95,7 +94,7 @@ fn corners_held(ready: &Ready, view: &View, block: usize, rects: &Rects) -> usiz
         let b = ready.occluders.outer(block * 16 + lane);
         for corner in (0..8).map(|i| b.corner(i).as_dvec3() - view.eye) {
             let depth = corner.dot(view.forward);
-            // By the directions of the image's own axes.
+            // Relative to the axes of the image.
             let [across, down] = [
                 |l: &super::super::Linear| l.x,
                 |l: &super::super::Linear| l.y,
@@ -132,7 +131,7 @@ fn corners_held(ready: &Ready, view: &View, block: usize, rects: &Rects) -> usiz
     held
 }
 
-/// All boxes of all blocks, sixteen at once and one by one.
+/// Tests all boxes of all blocks, sixteen at once and one by one.
 struct Hidden<'a>(&'a MaskedInner, &'a [Rects]);
 
 impl Work for Hidden<'_> {

@@ -126,7 +126,7 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
     for item in 0..3 {
         assert_eq!(faces(&whole, item), faces(&solid, item));
     }
-    // The lower z of the first one is the floor no more.
+    // The lower z of the first box is no longer at the floor.
     inner[0].1.min.z += 0.25;
     let less = OccluderScene::among(&scene, &inner, &[]);
     assert_eq!(faces(&less, 0), faces(&solid, 0) & !(1 << 2));

@@ -1,4 +1,4 @@
-//! Checks of the occlusion stage against single rays in f64.
+//! Comparison of the occlusion stage with single rays in f64.
 
 mod by_rays;
 mod lanes;
@@ -29,7 +29,7 @@ fn case_count(variable: &str, cases: usize) -> usize {
     std::env::var(variable).map_or(cases, |n| n.parse().unwrap())
 }
 
-/// Items in view that are kept, in order: by two passes, then interleaved.
+/// Kept items in the view, in order: by two passes, then interleaved.
 fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> [Vec<ItemId>; 2] {
     let two_passes = TwoPass {
         buffer: B::new(view.grid),

@@ -1,4 +1,4 @@
-//! No occlusion at all: what leaving the stage out keeps.
+//! No occlusion: the baseline that removes nothing hidden.
 
 use super::super::buffer::OcclusionBuffer;
 use super::super::outline::Outline;
@@ -6,8 +6,9 @@ use super::super::rect::{Rect, Rects};
 use crate::kernel::{Isa, LaneMask};
 use crate::visibility::SampleGrid;
 
-/// A buffer that hides nothing. What no ray of the image can meet is still left
-/// out, as the couplings see to that.
+/// A buffer that hides nothing.
+///
+/// The couplings still remove boxes that no ray of the image can meet.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct NoOcclusion;
 

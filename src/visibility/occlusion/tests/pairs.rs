@@ -1,7 +1,7 @@
-//! Pairs of boxes that are hard to tell apart.
+//! Pairs of boxes that are hard to distinguish.
 //!
-//! Edges are on borders and centres of pixels; depths of faces are equal but for the last
-//! bits of their coordinates.
+//! Edges are on borders and centres of pixels; depths of faces differ only in the last bits of
+//! their coordinates.
 
 use glam::DVec3;
 
@@ -46,7 +46,7 @@ fn on_pixels(columns: [usize; 2], rows: [usize; 2], depth: f64, rng: &mut Seeded
     WorldBox::new(low, high)
 }
 
-/// An interval within two borders, mostly close to both.
+/// An interval between two borders, mostly close to both.
 fn within([first, last]: [usize; 2], rng: &mut SeededRng) -> [usize; 2] {
     let mut by = |room: usize| match rng.below(8) {
         step @ 0..3 => step.min(room),
@@ -105,7 +105,7 @@ fn is_seen(boxes: &[WorldBox; 2], eye: DVec3, rng: &mut SeededRng) -> bool {
     })
 }
 
-/// Pairs whose second box is seen, is removed, and is removed although it is seen.
+/// Pairs whose second box is seen, removed, and removed although seen.
 #[derive(Default, Debug)]
 struct Counts {
     seen: usize,
@@ -126,7 +126,7 @@ fn counts<B: OcclusionBuffer>(pairs: usize) -> Counts {
         let is_seen = is_seen(&boxes, eye, &mut rng);
         let mut all = boxes.to_vec();
         if rng.below(2) == 0 {
-            // Something else is at the scene's bounds.
+            // Other boxes form the scene's bounds.
             let far_out = DVec3::splat(1000.0);
             all.push(WorldBox::around(eye - far_out, DVec3::ONE));
             all.push(WorldBox::around(eye + far_out, DVec3::ONE));
@@ -168,7 +168,7 @@ fn pixel_centres_lose_second_boxes_of_pairs() {
     assert!(lost.iter().all(|&lost| lost > 0), "{lost:?}");
 }
 
-/// A run of minutes over `OCCLUSION_PAIRS` pairs.
+/// Runs for minutes over `OCCLUSION_PAIRS` pairs.
 #[test]
 #[ignore = "minutes"]
 fn whole_pixels_lose_no_second_box_of_many_pairs() {

@@ -31,7 +31,7 @@ fn perspective(near: f64) -> Lens {
     Lens::perspective(60.0, 1.6, near, None).unwrap()
 }
 
-/// Boxes far outside of every view: no other box reaches the scene's bounds.
+/// Boxes far outside of every view, so that no other box is at the scene's bounds.
 fn bounds() -> [WorldBox; 2] {
     [solid([-90.0; 3], [-89.0; 3]), solid([900.0; 3], [901.0; 3])]
 }
@@ -59,7 +59,7 @@ fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
 
 #[test]
 fn what_is_as_near_is_not_hidden() {
-    // Twice the same wall, and one flush with its front.
+    // The same wall twice, and a box flush with its front.
     let flush = solid([10.0, -1.0, -1.0], [12.0, 1.0, 1.0]);
     let wall = solid(WALL.0, WALL.1);
     let boxes = within_bounds(&[wall, wall, flush]);
@@ -71,7 +71,7 @@ fn what_is_as_near_is_not_hidden() {
 
 #[test]
 fn what_is_as_large_in_the_image_is_not_hidden() {
-    // Its shadow's very outline: rays along the edge see it.
+    // Exactly as large as the wall's shadow: rays along its edge see it.
     let larger = solid([20.0, -6.0, -6.0], [21.0, 6.0, 6.0]);
     let boxes = within_bounds(&[solid(WALL.0, WALL.1), larger]);
     assert_eq!(
@@ -84,7 +84,7 @@ fn what_is_as_large_in_the_image_is_not_hidden() {
 fn what_is_nearer_than_near_hides_nothing_but_beside_the_window_it_does() {
     let behind = solid([20.0, -1.0, -1.0], [21.0, 1.0, 1.0]);
     let boxes = within_bounds(&[solid(WALL.0, WALL.1), behind]);
-    // The wall's front is cut off by the near plane: rays do not meet it at all.
+    // The near plane cuts off the wall's front: rays do not meet the wall at all.
     assert_eq!(
         kept_of::<MaskedInner>(&boxes, DVec3::ZERO, perspective(10.5)),
         [0, 1]
@@ -98,7 +98,7 @@ fn what_is_nearer_than_near_hides_nothing_but_beside_the_window_it_does() {
         [0]
     );
     let parallel = Lens::orthographic(20.0, 1.6, 0.5, 100.0).unwrap();
-    // Parallel rays begin inside of the wall that crosses their near plane.
+    // Parallel rays start inside the wall that crosses their near plane.
     let across = solid([0.0, -4.0, -4.0], [1.0, 4.0, 4.0]);
     let boxes = within_bounds(&[across, behind]);
     assert!(kept_of::<MaskedInner>(&boxes, DVec3::ZERO, parallel).contains(&1));
@@ -106,16 +106,16 @@ fn what_is_nearer_than_near_hides_nothing_but_beside_the_window_it_does() {
 
 #[test]
 fn what_stands_on_the_floor_hides_the_feet_behind_it() {
-    // The eye is so high that the wall's lower edge falls within a row of pixels.
+    // From this height the wall's lower edge falls inside a row of pixels.
     let wall = solid([10.0, -3.0, 0.0], [11.0, 3.0, 3.0]);
     let behind = solid([10.8, -1.0, 0.0], [11.2, 1.0, 1.0]);
     let eye = DVec3::new(0.0, 0.0, 1.7);
     let floor = [wall, behind, solid([0.0, 0.0, 0.0], [1.0, 1.0, 0.0])];
     assert!(!kept_of::<MaskedInner>(&floor, eye, perspective(0.1)).contains(&1));
-    // With something below the floor it is a row of pixels that shows.
+    // With a box below the floor, that row of pixels is visible.
     let cellar = within_bounds(&floor);
     assert!(kept_of::<MaskedInner>(&cellar, eye, perspective(0.1)).contains(&1));
-    // And an eye below the floor sees what stands on it from below.
+    // An eye below the floor sees from below what stands on it.
     let below = DVec3::new(0.0, 0.0, -1.7);
     assert!(kept_of::<MaskedInner>(&floor, below, perspective(0.1)).contains(&1));
 }

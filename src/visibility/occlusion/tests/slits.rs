@@ -28,7 +28,7 @@ fn lost_behind_fence<B: OcclusionBuffer>(grid: SampleGrid, gap: f64, seed: u64) 
     }
     let pickets = boxes.len();
     for picket in 0..pickets {
-        // Twice as far as the gap, in line with it.
+        // At twice the distance of the gap, in line with it.
         let y = 2.0 * (boxes[picket].max.y + gap * pixel / 2.0);
         for storey in -2..3 {
             let at = DVec3::new(20.25, y, 2.0 * f64::from(storey));
@@ -41,7 +41,7 @@ fn lost_behind_fence<B: OcclusionBuffer>(grid: SampleGrid, gap: f64, seed: u64) 
     let ready = Ready::of(Scene::from_boxes("fence", &boxes).unwrap());
     let frame = Frame::looking_along(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
     with_view(&ready, &Camera { frame, lens }, grid, |view, rays| {
-        // Through the middle of each gap (y runs against the columns).
+        // Through the centre of each gap (y is opposite to the columns).
         let mut seen = Vec::new();
         for picket in &boxes[..pickets - 1] {
             let across = -(picket.max.y + gap * pixel / 2.0) / 10.0;

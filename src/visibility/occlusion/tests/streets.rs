@@ -100,8 +100,8 @@ fn every_instruction_set_gives_the_same_answer() {
 
 /// Counts of six views.
 ///
-/// The counts of tested, drawn and kept boxes depend on the order of the traversal only: a
-/// faster traversal has the same counts.
+/// The numbers of tested, drawn and kept boxes depend only on the order of the traversal: a faster
+/// traversal has the same counts.
 #[test]
 fn the_walk_tests_draws_and_keeps_pinned_numbers_of_boxes() {
     let pinned = [[2067, 202, 398], [1160, 214, 183], [6003, 2535, 3529]];
@@ -126,7 +126,7 @@ fn the_walk_tests_draws_and_keeps_pinned_numbers_of_boxes() {
     }
 }
 
-/// A run of minutes over `OCCLUSION_RAYS` rays between the samples.
+/// Runs for minutes over `OCCLUSION_RAYS` rays between the samples.
 #[test]
 #[ignore = "minutes"]
 fn streets_lose_nothing_along_many_more_rays() {

@@ -1,6 +1,6 @@
-//! Two passes: all occluders are drawn, hidden ones too, then items are tested.
+//! Two passes: draws all occluders, hidden ones too, then tests items.
 //!
-//! Harder for a buffer than drawing what is found visible from front to back.
+//! Harder for a buffer than drawing visible occluders front to back.
 
 use super::super::buffer::{OcclusionBuffer, draw};
 use super::super::rect::{Candidate, Rects};
@@ -12,7 +12,7 @@ use crate::query::ItemId;
 
 /// Two passes over the items in a view.
 pub struct TwoPass<'a, B> {
-    /// The buffer that is drawn into.
+    /// Buffer to draw into.
     pub buffer: B,
     /// The occluders.
     pub scene: &'a OccluderScene,
@@ -23,7 +23,7 @@ pub struct TwoPass<'a, B> {
 }
 
 impl<B: OcclusionBuffer> TwoPass<'_, B> {
-    /// The items that are not hidden, in tree order.
+    /// Items that are not hidden, in tree order.
     pub fn kept(self, kernel: Kernel) -> Vec<ItemId> {
         kernel.run(self)
     }

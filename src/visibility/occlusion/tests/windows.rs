@@ -1,4 +1,4 @@
-//! Windows from far below what f32 can scale to far above it.
+//! Windows from far below to far above the range of f32.
 
 use glam::DVec3;
 
@@ -10,7 +10,7 @@ use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
-/// Boxes before the eye at depths from 4 to 30 units, some on the axis of view.
+/// Boxes at depths from 4 to 30 units, some on the axis of view.
 fn boxes(unit: f64, rng: &mut SeededRng) -> Vec<WorldBox> {
     let mut random = |n: usize| {
         let spread = [0.0, 2.0, 12.0][n % 3];
@@ -22,7 +22,7 @@ fn boxes(unit: f64, rng: &mut SeededRng) -> Vec<WorldBox> {
     (0..40).map(&mut random).collect()
 }
 
-/// How many items the rays of some lenses see; none of them is removed.
+/// Number of items visible through each lens, none of which is removed.
 fn seen_through(unit: f64, lenses: impl IntoIterator<Item = Lens>) -> Vec<usize> {
     let mut rng = SeededRng::new(8);
     let ready = Ready::of(Scene::from_boxes("few", &boxes(unit, &mut rng)).unwrap());
@@ -51,7 +51,7 @@ fn no_window_is_too_narrow_or_too_wide() {
             across.map(|w| Lens::orthographic((w * unit).min(1e37), 1.6, unit, 50.0 * unit));
         let beside = [1e-40, 1e-20, 1e-3, 1.0, 1e10, 1e30];
         let beside = beside.map(|w| Lens::off_axis([-0.1 * w, w, -w, 0.3 * w], unit, None));
-        // The window is on the near plane.
+        // Windows on the near plane.
         let at_near = [1e-40, 1e-3, 1.0, 1e10].map(|w| {
             let [low, high] = [0.2 * unit, (0.2 + w) * unit];
             Lens::off_axis([low, high, low, high], unit, None)

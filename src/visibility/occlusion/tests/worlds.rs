@@ -1,4 +1,4 @@
-//! Thousands of small random worlds: nothing that a ray sees may be missing.
+//! Thousands of small random worlds: no item that a ray sees may be missing.
 
 use glam::DVec3;
 
@@ -10,8 +10,10 @@ use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
-/// A handful of boxes of any shape, on a grid of whole numbers every other time
-/// (so that faces coincide), standing on a floor every other time.
+/// Boxes of any shape, 4 to 43 and some duplicates.
+///
+/// Half of the worlds are on an integer grid, so that faces coincide; in half of them boxes stand
+/// on a floor.
 fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
     let count = 4 + rng.below(40);
     let whole = rng.below(2) == 0;
@@ -40,13 +42,13 @@ fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
     boxes
 }
 
-/// An eye about the boxes, every other time within their bounds.
+/// A camera around the boxes; half of the eyes are within their bounds.
 fn camera(rng: &mut SeededRng, far_out: f64, parallel: bool) -> Camera {
     let reach = if rng.below(2) == 0 { 9.0 } else { 25.0 };
     let mut eye = point_between(DVec3::splat(-reach), DVec3::splat(reach), rng);
     let mut forward = point_between(DVec3::splat(-6.0), DVec3::splat(6.0), rng) - eye;
     if rng.below(3) == 0 {
-        // Along an axis, from a whole number.
+        // Along an axis, from integer coordinates.
         (eye, forward) = (eye.round(), [DVec3::X, DVec3::Y, -DVec3::Z][rng.below(3)]);
     }
     if rng.below(3) == 0 {
@@ -78,7 +80,7 @@ fn camera(rng: &mut SeededRng, far_out: f64, parallel: bool) -> Camera {
     Camera { frame, lens }
 }
 
-/// How many items that rays see are missing, and how many items were removed.
+/// Numbers of items seen by rays that are missing, and of removed items.
 fn losses<B: OcclusionBuffer>(
     worlds: std::ops::Range<u64>,
     far_out: f64,
@@ -143,7 +145,7 @@ fn no_occlusion_loses_nothing() {
     assert_eq!(losses::<NoOcclusion>(0..200, 0.0, false).0, 0);
 }
 
-/// More worlds than a test has time for, four times `OCCLUSION_WORLDS`.
+/// Four times `OCCLUSION_WORLDS` worlds: too slow for the normal tests.
 #[test]
 #[ignore = "minutes"]
 fn whole_pixels_lose_nothing_in_many_more_worlds() {

@@ -1,4 +1,4 @@
-//! The plain depth buffer, a reference for the masked ones.
+//! Plain depth buffer, the reference for the masked buffers.
 //!
 //! One depth per pixel, at its centre; every pixel of a box is tested.
 
@@ -9,7 +9,7 @@ use crate::kernel::{Isa, LANES, LaneMask, first_lanes};
 use crate::query::Bits;
 use crate::visibility::SampleGrid;
 
-/// Nearness at the centre of each pixel; 0 where nothing was drawn.
+/// Nearness at the centre of each pixel; 0 if nothing is drawn there.
 #[derive(Clone, Debug)]
 pub struct ZBuffer {
     grid: SampleGrid,

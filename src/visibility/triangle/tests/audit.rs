@@ -1,7 +1,7 @@
-//! A search for lost triangles.
+//! Search for lost triangles.
 //!
-//! Eyes next to the boundary of a cluster's cone, of flat, thin and far clusters. What a back
-//! end removes is compared with the exact test.
+//! Eyes are next to the boundary of a cluster's cone; clusters are flat, thin or far away. Compares
+//! what a back end removes with the exact test.
 
 use std::sync::Arc;
 
@@ -14,12 +14,12 @@ use crate::kernel::Kernel;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
 named! {
-    /// Which eyes are tried.
+    /// Kind of eyes in a search.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
     pub enum EyeKind {
-        /// Points that f32 holds: only the test itself rounds.
+        /// Points in f32: only the test itself rounds.
         Single = "f32",
-        /// Any points of f64: the eye is rounded too.
+        /// Points in f64: the eye is rounded too.
         Double = "f64",
         /// Eyes at infinity: directions of a parallel lens.
         Direction = "direction",
@@ -29,24 +29,26 @@ named! {
 /// Result of a search.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Audit {
-    /// Pairs of a cluster and an eye.
+    /// Number of pairs of a cluster and an eye.
     pub pairs: usize,
-    /// Pairs of which the back end removed a triangle.
+    /// Pairs for which the back end removed a triangle.
     pub rejected: usize,
-    /// Pairs of which it removed a triangle whose front the eye sees.
+    /// Pairs for which it removed a triangle that faces the eye.
     pub false_negatives: usize,
-    /// Largest sine of the angle between the plane of a lost triangle and the line
-    /// from the eye to its first corner, rounded: how far it is turned to the eye.
+    /// Largest sine by which a lost triangle faces the eye, rounded.
+    ///
+    /// This is the sine of the angle between its plane and the line from the eye to its first
+    /// corner.
     pub worst_sine: f64,
-    /// Eye and corners of the first of them.
+    /// Eye and corners of the first lost triangle.
     pub witness: Option<(DVec3, [Vec3; 3])>,
 }
 
-/// Clusters of one world; each is tried with `EYES` eyes.
+/// Number of clusters per world; each is tried with `EYES` eyes.
 const WORLD: usize = 16;
 const EYES: usize = 64;
 
-/// Tries at least `pairs` pairs. The same ones for every back end and machine.
+/// Tries at least `pairs` pairs, the same for every back end and machine.
 pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit {
     let mut rng = SeededRng::new(seed);
     let mut found = Audit {
@@ -98,7 +100,7 @@ fn sine(eye: &Eye, corners: [Vec3; 3]) -> f64 {
     way.normalize_or_zero().dot(normal(corners).normalize())
 }
 
-/// A few triangles about a point: flat, bent or thin; near the zero or far from it.
+/// A few triangles around a point: flat, bent or thin; near the origin or far away.
 fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let size = libm::exp2(rng.between(-8.0, 8.0));
     let offset = match rng.below(3) {
@@ -111,7 +113,7 @@ fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let v = up.cross(u) * [1.0, 1.0, 1e-3, 1e-5][rng.below(4)];
     let bend = [0.0, 0.0, 0.05, 0.5][rng.below(4)];
     let count = 1 + rng.below(6);
-    // A fan about the centre.
+    // A fan around the centre.
     let points = (0..=count + 1).map(|i| {
         let angle = std::f64::consts::TAU * i as f64 / (count + 2) as f64;
         let (sin, cos) = libm::sincos(angle);
@@ -126,11 +128,10 @@ fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// An eye near the boundary.
+/// An eye near the boundary, and the direction to it.
 ///
-/// It is in the plane of a triangle but for some ulps, where the
-/// cone of the cluster touches that plane or anywhere. And the direction to it, also
-/// off by some ulps.
+/// Up to some ulps the eye is in the plane of a triangle, where the cluster's cone touches that
+/// plane or anywhere else in it; the direction is perturbed by some ulps too.
 fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> [DVec3; 2] {
     let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
     let normals: Vec<DVec3> = triangles
@@ -148,7 +149,7 @@ fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> [DVec3;
         _ => ((b - a) * rng.between(-1.0, 1.0) + (c - a) * rng.between(-1.0, 1.0))
             .normalize_or(DVec3::X),
     };
-    // Some ulps of f32 or of f64 to either side.
+    // Some ulps of f32 or of f64 in either direction.
     let ulp = [f64::from(f32::EPSILON), f64::EPSILON][rng.below(2)];
     let mut off = |size: DVec3| {
         let step = |k: usize| size[k] * ulp * (rng.below(9) as f64 - 4.0) / 2.0;

@@ -17,7 +17,7 @@ pub const ROW: TriangleRow = TriangleRow {
     build: |clusters| Box::new(PlainCones::of(clusters)),
 };
 
-/// Below this cosine a cone is taken for useless.
+/// Cosine below which a cone counts as useless.
 const LEAST_COSINE: f32 = 0.1;
 
 /// A cone as the library documents it.
@@ -28,14 +28,14 @@ struct PlainCone {
     cutoff: f32,
 }
 
-/// The cones of clusters.
+/// Back end with the cones of clusters.
 #[derive(Clone, Debug)]
 pub struct PlainCones {
     cones: Vec<PlainCone>,
 }
 
 impl PlainCones {
-    /// One cone per cluster, fitted here. O(t).
+    /// Fits one cone per cluster. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> PlainCones {
         let cone = |cluster| {
             let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
@@ -50,7 +50,7 @@ impl PlainCones {
 }
 
 impl PlainCone {
-    /// The cone of a cluster that is always kept, as the library gives it.
+    /// Cone of a cluster that is always kept, as the library defines it.
     const NEVER: PlainCone = PlainCone {
         apex: Vec3::ZERO,
         axis: Vec3::ZERO,
@@ -84,7 +84,7 @@ impl PlainCone {
         })
     }
 
-    /// `dot(normalize(cone_apex - camera_position), cone_axis) >= cone_cutoff`.
+    /// Tests `dot(normalize(cone_apex - camera_position), cone_axis) >= cone_cutoff`.
     #[inline(always)]
     fn rejects(&self, eye: Vec3) -> bool {
         let way = self.apex - eye;
@@ -92,9 +92,9 @@ impl PlainCone {
     }
 }
 
-/// A small ball about points (Ritter 1990, "An efficient bounding sphere").
+/// A small enclosing ball of points (Ritter 1990, "An efficient bounding sphere").
 fn ball(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
-    // The pair of extreme points that is farthest apart, of three axes.
+    // The farthest pair among the extreme points of the three axes.
     let extremes = |k: usize| {
         let low = points.clone().min_by(|a, b| a[k].total_cmp(&b[k]))?;
         let high = points.clone().max_by(|a, b| a[k].total_cmp(&b[k]))?;
