@@ -1,6 +1,6 @@
-//! Back ends against arithmetic on integers of any size.
+//! Back ends compared with arithmetic on integers of any size.
 //!
-//! It shares nothing with theirs.
+//! It shares no code with theirs.
 
 mod triangles;
 
@@ -30,11 +30,13 @@ fn solids(boxes: &[WorldBox]) -> Solids {
     Solids::of(&Scene::from_boxes("test", boxes).unwrap())
 }
 
-/// Boxes between grid points, many of them alike, flat or touching; rays from
-/// grid points through others.
+/// Random boxes and rays on a grid.
+///
+/// Boxes lie between grid points, many of them alike, flat or touching; rays lead from grid points
+/// through others.
 struct Worlds {
     rng: SeededRng,
-    /// A unit of the grid, and where its zero is.
+    /// Size of a grid unit, and position of the grid's origin.
     unit: f64,
     zero: DVec3,
 }
@@ -77,8 +79,7 @@ impl Worlds {
     }
 }
 
-/// The grids that worlds are made on: integers, numbers that no f32 holds, and
-/// integers far from zero.
+/// Grids of integers, of numbers that are not in f32, and of far integers.
 fn grids(seed: u64) -> [Worlds; 3] {
     [
         Worlds::new(seed, 1.0, DVec3::ZERO),
@@ -87,13 +88,12 @@ fn grids(seed: u64) -> [Worlds; 3] {
     ]
 }
 
-/// Asks of the first hit and of the nearest few; returns how many answers of
-/// how many differ from the judge's.
+/// Queries the first hit and the nearest few; returns the number of wrong answers.
 fn differing(pick: &dyn Pick, ray: &Ray, truth: &[(Depth, ItemId)]) -> usize {
     let mut wrong = 0;
     wrong += usize::from(pick.first(ray) != truth.first().map(|met| met.1));
     for count in [0, 1, 2, 5] {
-        // What is there stays.
+        // Earlier contents must stay.
         let mut items = vec![7];
         pick.nearest(ray, count, &mut items);
         let kept = match count.checked_sub(1).map(|last| truth.get(last)) {
@@ -165,8 +165,7 @@ fn boxes_of_any_size_are_picked_alike() {
     }
 }
 
-/// Directions that hardly move along an axis, or not at all, and rays that the
-/// bounds in f32 do not cover.
+/// Directions with tiny or zero components, and rays outside the f32 analysis.
 #[test]
 fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
@@ -221,7 +220,7 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
     }
 }
 
-/// Cameras in scenes: on the ground and above everything.
+/// Cameras on the ground of a scene and above everything.
 fn cameras(name: &str) -> (Scene, Vec<Camera>) {
     let scene = load(name, &Default::default()).unwrap();
     let bounds = scene.world_bounds();
@@ -311,7 +310,7 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
                 }
             }
             found += items.len();
-            // No wider than the rectangle: what the whole image holds is more.
+            // The rectangle's answer is smaller: the whole image contains more items.
             let whole = CursorRectangle {
                 min: [0.0; 2],
                 max: [1.0; 2],

@@ -225,8 +225,10 @@ struct Node {
 struct Child(u32);
 
 impl Child {
+    /// Packs a node number and a number of item lanes.
+    ///
     /// # Panics
-    /// With 2^27 nodes, of a billion boxes.
+    /// With 2^27 nodes, i.e. for a billion boxes.
     fn new(node: usize, items: usize) -> Child {
         assert!(node < 1 << 27, "too many nodes");
         Child((node as u32) << 5 | items as u32)

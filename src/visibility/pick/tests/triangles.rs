@@ -86,9 +86,9 @@ fn grid(rng: &mut SeededRng, most: usize) -> Vec3 {
     Vec3::new(along(), along(), along())
 }
 
-/// Corners on a grid: depths are equal, rays lie in planes, triangles have no area.
+/// Corners on a grid: equal depths, rays in planes, triangles without area.
 ///
-/// Directions hardly move along an axis, and origins lie beyond the error analysis.
+/// Directions hardly move along an axis, and origins lie outside the error analysis.
 #[test]
 fn every_instruction_set_finds_what_testing_all_finds() {
     let mut rng = SeededRng::new(17);
@@ -109,7 +109,7 @@ fn every_instruction_set_finds_what_testing_all_finds() {
             bounds: all.iter().map(|of| Aabb::of_points(of.corners)).collect(),
             all,
             origin: DVec3::new(3.0, -7.0, 0.5),
-            // The last few are no items.
+            // The last few triangles belong to no item.
             items: n * 2 / 5,
         };
         let wide = Kernel::available().map(|kernel| (kernel, WideRay::of(&facets, kernel)));

@@ -1,4 +1,4 @@
-//! Rows over the sectors of maps, the REJECT table among them, against rays.
+//! Rows over the sectors of maps, with the REJECT table, compared with rays.
 
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
     let [floor, _] = map.sectors[wall.sectors[0].unwrap() as usize];
     let (middle, right) = ((from + to) * 0.5, -(to - from).perp().normalize());
     let mut rng = SeededRng::new(1);
-    // The near window is some 0.1 wide; right of a linedef is its front.
+    // The near window is some 0.1 wide; the right of a linedef is its front.
     for (away, height, place) in [
         (4.0, 41.0, true),
         (0.01, 41.0, false),

@@ -1,6 +1,6 @@
-//! A map as surfaces against the same map as sectors.
+//! A map as surfaces compared with the same map as sectors.
 //!
-//! Two ways to visibility that share only the lumps.
+//! Two independent computations of visibility, which share only the lumps.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ fn world(name: &str) -> World {
     }
 }
 
-/// Number of visible items, and of those missing in the answer of the search.
+/// Number of visible items, and of those missing in the search's answer.
 fn visible_and_lost(world: &World, graph: &RegionGraph, eyes: usize) -> (usize, usize) {
     let index = SurfaceIndex::build(&world.surfaces);
     let items = RegionItems::of(graph, &world.scene);
@@ -77,7 +77,7 @@ fn items_have_the_numbers_of_the_scene_and_lie_in_their_boxes() {
                 whole += usize::from(bounds == *b);
             }
         }
-        // Those of one side, at least, from floor to ceiling.
+        // At least the one-sided walls, from floor to ceiling.
         println!("{name}: {whole} of {} items", scene.items.len());
         assert!(whole > scene.items.len() / 3, "{whole}");
     }
@@ -108,9 +108,10 @@ fn a_graph_that_lacks_openings_is_caught() {
     assert!(caught > 0);
 }
 
-/// A ray ends at a wall, floor or ceiling of the last sector it passes, neither
-/// earlier nor later. Rays that pass a corner of the map to rounding are not counted
-/// on: there is none among these.
+/// A ray ends at a surface of the last sector that it passes.
+///
+/// It ends there neither earlier nor later. Rays through a corner of the map, up to rounding, might
+/// fail; there is none among these.
 #[test]
 fn rays_end_where_rays_through_sectors_end() {
     for name in MAPS {

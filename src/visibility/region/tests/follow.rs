@@ -1,4 +1,4 @@
-//! The regions that a ray passes before it meets what is opaque, one by one.
+//! Regions that a ray passes before it meets an opaque border, one by one.
 //!
 //! Plain f64, by searches that share nothing with the back ends.
 
@@ -9,8 +9,9 @@ use super::super::{IdSet, Opening, OpeningPlane, RegionGraph, RegionId};
 use crate::scene::{BspChild, LeafNode, QuakeMap, WorldBox};
 use crate::visibility::Ray;
 
-/// Adds the regions, boxes each, that a ray passes from its near to its far end,
-/// until it meets a border where there is no opening.
+/// Adds the box regions that a ray passes between near and far.
+///
+/// Ends at a border without an opening.
 pub fn boxes(graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
     let start = ray.at(ray.near);
     let start = WorldBox::new(start, start);
@@ -47,14 +48,14 @@ fn boxes_from(graph: &RegionGraph, home: RegionId, ray: &Ray, seen: &mut IdSet) 
 }
 
 impl Opening {
-    /// The other of its two regions.
+    /// The other of the opening's two regions.
     pub(super) fn other(&self, region: RegionId) -> RegionId {
         let [front, behind] = self.sides;
         if region == front { behind } else { front }
     }
 }
 
-/// Lower and upper corner of the box about an opening.
+/// Lower and upper corner of an opening's bounds.
 fn bounds(opening: &Opening) -> [DVec3; 2] {
     let corners = opening.corners.into_iter();
     let [low, high] = [
@@ -64,7 +65,7 @@ fn bounds(opening: &Opening) -> [DVec3; 2] {
     [low, high].map(|corner| corner.expect("four corners"))
 }
 
-/// The face by which a ray leaves a box: axis, coordinate and depth.
+/// Face through which a ray leaves a box: axis, coordinate and depth.
 fn way_out(b: &WorldBox, ray: &Ray) -> Option<(usize, f64, f64)> {
     let mut first: Option<(usize, f64, f64)> = None;
     for axis in 0..3 {
@@ -78,10 +79,10 @@ fn way_out(b: &WorldBox, ray: &Ray) -> Option<(usize, f64, f64)> {
     first
 }
 
-/// The same through the sectors of a map, from linedef to linedef.
+/// Adds the sectors of a map that a ray passes, from linedef to linedef.
 pub fn sectors(map: &DoomMap, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) {
     let (start, mut met) = (ray.at(ray.near), Vec::new());
-    // The sector of the point itself comes behind those of linedefs that are near it.
+    // The sector of the point itself follows those of linedefs near it.
     graph
         .ground
         .regions_at(&WorldBox::new(start, start), &mut met);
@@ -98,7 +99,7 @@ pub fn sectors(map: &DoomMap, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) 
         }
         let t = (a - o).perp_dot(b - a) / d.perp_dot(b - a);
         if t >= ray.near && t <= ray.far {
-            // It begins right of the ray: crossed from its left to its right.
+            // The line starts right of the ray: it is crossed from its left to its right.
             crossings.push((t, line, sa < 0.0));
         }
     }
@@ -119,10 +120,10 @@ pub fn sectors(map: &DoomMap, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) 
     }
 }
 
-/// Farthest depth at which rays are followed: beyond every map.
+/// Farthest depth to which rays are followed: beyond every map.
 const FARTHEST: f64 = 1e10;
 
-/// The same through the open leaves of a map.
+/// Adds the clusters of a map whose open leaves a ray passes.
 pub fn leaves(map: &QuakeMap, ray: &Ray, seen: &mut IdSet) {
     let value = |node: &LeafNode, depth: f64| {
         node.normal.as_dvec3().dot(ray.at(depth)) - f64::from(node.distance)

@@ -1,4 +1,4 @@
-//! Search and stored rows from an eye against rays.
+//! Search and stored rows from an eye, compared with rays.
 
 use super::super::*;
 use super::follow;
@@ -19,7 +19,7 @@ fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) 
     out
 }
 
-/// How many regions that rays pass are missing in the search's answers.
+/// Number of regions on rays that are missing in the search's answers.
 pub fn missing(graph: &RegionGraph, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
     let mut rng = SeededRng::new(seed);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());

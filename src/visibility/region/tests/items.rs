@@ -1,4 +1,4 @@
-//! Items of regions against what rays meet.
+//! Items of regions compared with the items that rays meet.
 
 use super::super::*;
 use super::worlds::*;
@@ -6,9 +6,9 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::SeededRng;
 use crate::visibility::{Rays, Solids};
 
-/// How many first hits of rays are not among the items of the listed regions.
+/// Number of first hits of rays that are not among the items of the listed regions.
 ///
-/// Eyes are anywhere, in walls too; the near plane is sometimes behind a wall.
+/// Eyes are anywhere, also in walls; the near plane is sometimes behind a wall.
 fn lost_hits(world: &str, graph_of: fn(&crate::scene::Scene) -> RegionGraph) -> usize {
     let (scene, _) = rooms(world);
     let graph = graph_of(&scene);

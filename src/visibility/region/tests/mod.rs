@@ -1,4 +1,4 @@
-//! Every row against rays that are followed through the regions one by one.
+//! Every row compared with rays that are followed through the regions one by one.
 
 mod doom;
 mod doom_surfaces;

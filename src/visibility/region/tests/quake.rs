@@ -1,4 +1,4 @@
-//! A Quake III map of two rooms. By its table the first does not see the second.
+//! Quake III map of two rooms; by its table the first does not see the second.
 
 use glam::DVec3;
 

@@ -5,8 +5,10 @@ use glam::DVec3;
 use super::super::{OpeningPlane, RegionGraph, RegionId};
 use crate::arithmetic::Expansion;
 
-/// Tests whether a segment from within one region to within another leads
-/// through openings only, touching no edge. Of a graph of boxes; O(regions passed * exits).
+/// Tests whether a segment between two regions crosses openings only.
+///
+/// Both ends must be inside their regions, and the segment must touch no edge. For graphs of boxes;
+/// O(regions passed * exits).
 pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3; 2]) -> bool {
     for (region, p) in regions.into_iter().zip([a, b]) {
         let room = graph.parts[region as usize][0];
@@ -38,13 +40,13 @@ pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3
     false
 }
 
-/// Tests for a line from a to b that meets the plane at `at` within the corners.
+/// Tests whether a line from a to b crosses the plane `at` within the corners.
 fn passes(axis: usize, at: f64, corners: &[DVec3; 4], a: DVec3, b: DVec3) -> bool {
     let exact = Expansion::from;
     let minus = |x: f64, y: f64| &exact(x) - &exact(y);
     let run = minus(b[axis], a[axis]);
     (0..3).filter(|&k| k != axis).all(|k| {
-        // a_k + (b_k - a_k) (at - a) / run against an edge, times run.
+        // Compares a_k + (b_k - a_k) (at - a) / run with an edge, both multiplied by run.
         let side = |edge: f64| {
             let there = &minus(b[k], a[k]) * &minus(at, a[axis]);
             let wanted = &minus(edge, a[k]) * &run;

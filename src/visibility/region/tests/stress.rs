@@ -62,18 +62,18 @@ fn chain(rng: &mut SeededRng, base: DVec3, length: usize, shrink: f64, margins: 
     }
 }
 
-/// How often the search loses the last room of an accepted line of sight.
+/// Number of accepted lines of sight whose last room the search loses.
 ///
-/// And the number of times that the line was accepted.
+/// Also returns the number of accepted lines.
 fn lost(shrink: f64) -> (usize, usize) {
     let (mut lost, mut accepted) = (0, 0);
     for round in 0..400u64 {
         let base = [DVec3::ZERO, DVec3::new(1e7, -3e6, 12_345.678)][round as usize % 2];
         let length = 2 + round as usize % 63;
-        // The finest are some units in the last place.
+        // The finest margins are some units in the last place.
         let last_place = f64::EPSILON * (1.0 + base.abs().max_element());
         let margins = [1e-3, 1e-7, 8.0 * last_place, 2.0 * last_place];
-        // The same numbers for the truth and for the input of the search.
+        // The same random numbers for the truth and for the input of the search.
         let truth = chain(&mut SeededRng::new(round), base, length, 0.0, &margins);
         let told = chain(&mut SeededRng::new(round), base, length, shrink, &margins);
         let graph = RegionGraph::of_boxes(truth.rooms, truth.openings);
@@ -124,7 +124,7 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     };
     let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
     assert_eq!(answer(level), (false, 40));
-    // The last opening that is not beyond the far plane leads one room on.
+    // The last opening that is not beyond the far plane leads one room further.
     let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
     let (place, count) = answer(near);
     assert!(place);

@@ -13,8 +13,9 @@ pub fn rooms(spec: &str) -> (Scene, RegionGraph) {
     (scene, graph)
 }
 
-/// A camera in a random region, its eye 1.7 above the floor where that is inside,
-/// looking about level.
+/// A camera in a random region, 1.7 above the floor, looking about level.
+///
+/// In a low region the eye is just below the ceiling instead.
 pub fn eye_in(graph: &RegionGraph, rng: &mut SeededRng) -> Rays {
     let b = graph.parts[rng.below(graph.len())][0];
     let size = b.max - b.min;
@@ -34,7 +35,7 @@ pub fn looking(eye: DVec3, rng: &mut SeededRng) -> Rays {
     Rays::of(&Camera { frame, lens }).unwrap()
 }
 
-/// The first solid that a ray enters, or none.
+/// First solid that a ray enters, or none.
 pub fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
     let enters = |b: &WorldBox| {
         let inverse = ray.direction.recip();
@@ -51,7 +52,7 @@ pub fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
     hits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| id)
 }
 
-/// Cubes in a block, with openings of all sizes and heights between most of them.
+/// A block of cubes, with openings of all sizes and heights between most of them.
 pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> RegionGraph {
     let number = |i: [usize; 3]| ((i[2] * count[1] + i[1]) * count[0] + i[0]) as u32;
     let (mut boxes, mut openings) = (Vec::new(), Vec::new());
@@ -85,7 +86,7 @@ pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> RegionGraph {
     RegionGraph::of_boxes(boxes, openings)
 }
 
-/// A graph without one of its openings: wrong on purpose, to see who notices.
+/// A graph that lacks one opening: it must be detected as wrong.
 pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
     let mut openings = graph.openings.to_vec();
     openings.remove(index);

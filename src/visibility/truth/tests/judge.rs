@@ -1,4 +1,4 @@
-//! The truth by whole numbers of any length, without an index.
+//! Truth by integers of any length, without an index.
 //!
 //! The tests compare everything else with it.
 
@@ -13,7 +13,7 @@ use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, SurfaceKind, Surfaces, WorldBox};
 use crate::visibility::{Ray, Solids};
 
-/// A double as a whole number of units of 2^-300.
+/// A double as an integer number of units of 2^-300.
 pub fn exact(x: f64) -> IBig {
     let bits = x.to_bits();
     let (exponent, fraction) = ((bits >> 52 & 0x7FF) as i32, bits & ((1 << 52) - 1));
@@ -27,7 +27,7 @@ pub fn exact(x: f64) -> IBig {
     if x < 0.0 { -size } else { size }
 }
 
-/// A depth: numerator and denominator, which is above zero.
+/// A depth: numerator and denominator, which is positive.
 pub type Depth = (IBig, IBig);
 
 pub fn order(a: &Depth, b: &Depth) -> Ordering {
@@ -66,7 +66,7 @@ pub fn entry(ray: &Ray, b: &WorldBox) -> Option<Depth> {
     met.then_some(first)
 }
 
-/// The front items of a ray, ascending.
+/// Front items of a ray, ascending.
 pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
     let mut best: Option<Depth> = None;
     let mut items = Vec::new();
@@ -86,7 +86,7 @@ pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
     items
 }
 
-/// A few boxes on small whole numbers, full of faces in common planes, some flat.
+/// A few boxes with integer coordinates, full of coplanar faces, some flat.
 pub fn ties(rng: &mut SeededRng, count: usize) -> Vec<WorldBox> {
     let coordinate = |rng: &mut SeededRng| rng.below(7) as f64 - 3.0;
     let corner = |rng: &mut SeededRng| [(); 3].map(|()| coordinate(rng));
@@ -102,9 +102,10 @@ pub fn solids(boxes: &[WorldBox]) -> Solids {
     Solids::of(&Scene::about("test", boxes, DVec3::ZERO).unwrap())
 }
 
-/// Cameras among them, of every kind of lens: eyes on whole numbers, in the planes
-/// of faces; views along axes, along diagonals and at random; windows whose samples
-/// lie on edges.
+/// Cameras among these boxes, with every kind of lens.
+///
+/// Eyes at integers, in the planes of faces; views along axes, along diagonals and at random;
+/// windows whose samples lie on edges.
 pub fn camera(rng: &mut SeededRng) -> Camera {
     let whole = |rng: &mut SeededRng, n: usize| rng.below(2 * n + 1) as f64 - n as f64;
     let eye = DVec3::new(whole(rng, 5), whole(rng, 5), whole(rng, 5));
@@ -141,7 +142,7 @@ pub fn camera(rng: &mut SeededRng) -> Camera {
         1 => Lens::perspective(rng.between(20.0, 120.0), 1.5, near, Some(near + 3.0)),
         2 => Lens::off_axis([-near, near, -near, near], near, None),
         3 => Lens::off_axis([-0.25 * near, near, 0.0, near], near, Some(9.0)),
-        // Slopes that the slab tests in f32 do not cover.
+        // Slopes that the f32 slab tests do not cover.
         4 => Lens::off_axis([-1.0, 1.0, -1.0, 1.0], 1.0 / 4096.0, None),
         _ => Lens::orthographic(8.0, 1.0, [-2.0, 0.0, 1.0][rng.below(3)], 7.0),
     };
@@ -152,8 +153,9 @@ pub fn camera(rng: &mut SeededRng) -> Camera {
     }
 }
 
-/// Triangles on few whole numbers: shared edges and corners, common planes, some
-/// without area, and boxes of them.
+/// Triangles on a few integers, and boxes of triangles.
+///
+/// They share edges and corners and lie in common planes; some have no area.
 pub fn triangles(rng: &mut SeededRng) -> Surfaces {
     let shift = [0.0, 0.0, 0.1, 3e6 + 0.3][rng.below(4)];
     let mut surfaces = Surfaces::about(DVec3::splat(shift));

@@ -1,4 +1,4 @@
-//! Samples of boxes and of triangles against a judge of its own.
+//! Samples of boxes and of triangles compared with an independent reference.
 
 mod boxes;
 pub mod judge;
@@ -11,7 +11,7 @@ use crate::threads;
 use crate::visibility::{Ray, Rays, SampleGrid};
 
 impl SampleTruth {
-    /// Follows every ray of the grid through bodies without holes.
+    /// Traces every ray of the grid through bodies without holes.
     pub fn of<B: Body>(
         index: &BodyIndex<B>,
         rays: &Rays,
@@ -23,12 +23,12 @@ impl SampleTruth {
     }
 }
 
-/// In place of an item where a ray meets nothing.
+/// Id used where a ray meets nothing.
 pub const NO_ITEM: ItemId = ItemId::MAX;
 
-/// The front item of each sample, row by row from the top left.
+/// Front item of each sample, row by row from the top left.
 ///
-/// The lowest of a tie, [`NO_ITEM`] where there is none.
+/// The lowest id of a tie, [`NO_ITEM`] if there is none.
 pub fn fronts<B: Body>(
     index: &BodyIndex<B>,
     is_opaque: &impl Fn(&B, &B::Probe, &B::At) -> bool,
@@ -45,8 +45,7 @@ pub fn fronts<B: Body>(
 
 /// Items visible along any of `count` seeded random rays through the window.
 ///
-/// Ascending. A conservative back end delivers all of them.
-/// The same on any number of threads.
+/// Ascending. A conservative back end returns all of them. Independent of the number of threads.
 pub fn visible_by_random_rays<B: Body>(
     index: &BodyIndex<B>,
     rays: &Rays,
@@ -57,7 +56,7 @@ pub fn visible_by_random_rays<B: Body>(
     const CHUNK: usize = 4096;
     let mut found = vec![Vec::new(); count.div_ceil(CHUNK)];
     threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
-        // A random stream per chunk, whichever thread takes it.
+        // A random stream per chunk, whichever thread runs it.
         let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
         let mut seen = Front::new();
         for _ in 0..CHUNK.min(count - chunk * CHUNK) {

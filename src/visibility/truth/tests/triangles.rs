@@ -30,8 +30,10 @@ fn dot(a: &Point, b: &Point) -> IBig {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-/// Another way than the code under test: the depth in the plane, then the sides
-/// of the point there, scaled by the depth's denominator.
+/// Meeting by another method than the code under test.
+///
+/// Computes the depth of the plane, then the sides of the point there, scaled by the depth's
+/// denominator.
 fn met(ray: &Ray, origin: DVec3, corners: [Vec3; 3], two_sided: bool) -> Option<Depth> {
     let zero = point(origin.x, origin.y, origin.z);
     let [a, b, c] = corners.map(|p| {
@@ -125,7 +127,7 @@ fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
             let place = truth.visible.binary_search(&(item as ItemId));
             assert_eq!(place.map_or(0, |place| truth.samples_of[place]), wanted);
         }
-        // Rays that are aimed at corners and at middles of edges.
+        // Rays that aim at corners and at midpoints of edges.
         for _ in 0..12 {
             let t = rng.below(surfaces.triangles.len()) as u32;
             let [a, b, _] = surfaces.corners(t).map(Vec3::as_dvec3);
@@ -168,7 +170,7 @@ fn no_ray_slips_through_the_edges_of_a_closed_surface() {
                 near: 0.0,
                 far: f64::INFINITY,
             };
-            // Past the outline rays may miss; well within they must not.
+            // Rays near the silhouette may miss; others must not.
             if outward.dot(ray.direction) < -0.3 * outward.length() * ray.direction.length() {
                 let front = index.front_of(&ray);
                 assert_eq!(front.front, [0], "{t} {at}");
