@@ -24,9 +24,9 @@ use crate::query::{AnyVolume, QueryCost};
 /// own; 32 covers it for all depths of near and far. Underflow in f32 adds at most 2^-140 in total.
 ///
 /// An eye far away from everything it sees costs 2^-49 of its coordinates, by the derivation in f64
-/// and by the margin for it; planes that are sums of others are allowed four times that. A view so
-/// wide that its sides are nearly parallel leaves f64 no digits for its bounds; its margin is
-/// infinite, so that nothing is checked.
+/// and by the margin for it; the code allows four times that, for planes that are sums of others.
+/// A view so wide that its sides are nearly parallel leaves f64 no digits for its bounds; its
+/// margin is infinite, so that nothing is checked.
 pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 140) << 52);

@@ -94,7 +94,7 @@ impl CutOuts {
     /// Parses `fence`, `foliage:share=0.5,tile=2,seed=7`.
     ///
     /// # Errors
-    /// A mask or a parameter that is not known, a value out of range.
+    /// An unknown mask or parameter, or a value out of range.
     pub fn parse(text: &str) -> Result<CutOuts, SpecError> {
         let mut spec = Spec::parse(text)?;
         let mask = choice("mask", &MASKS)(spec.name())?;

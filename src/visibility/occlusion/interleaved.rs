@@ -18,7 +18,7 @@ use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 use crate::query::{Bits, ItemId};
 
-/// Default of [`Interleaved::drawn_part`]: one pixel of 320 x 180.
+/// Default of [`Interleaved::drawn_part`]: about one pixel of 320 x 180.
 const DEFAULT_DRAWN_PART: u32 = 65_536;
 
 /// Interleaved coupling; reuses its memory from view to view.
@@ -27,7 +27,7 @@ pub struct Interleaved<B> {
     /// Depth buffer, as the last view left it.
     pub buffer: B,
     kernel: Kernel,
-    /// Survivors are drawn if they may cover this fraction (1 / n) of the image.
+    /// Survivors are drawn if they may cover 1 / `drawn_part` of the image or more.
     pub(super) drawn_part: u32,
     /// [`key`]s of pending blocks, with their indices among the entries.
     queue: BinaryHeap<Reverse<(u64, u32)>>,

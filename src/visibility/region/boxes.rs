@@ -75,7 +75,7 @@ impl RegionGraph {
 
     /// Tests each item for being a possible border between regions.
     ///
-    /// Furniture, which is strictly inside one box, is none.
+    /// Furniture, which is strictly inside one box, is no border.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.concat());
         let is_border = |item: &Aabb| {

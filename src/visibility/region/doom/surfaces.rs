@@ -197,7 +197,7 @@ fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
         && turn(c, d, a).signum() * turn(c, d, b).signum() < 0
 }
 
-/// Splits an edge at those of some points that lie on it.
+/// Splits an edge at all given points that lie on it.
 pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     let away = |p: Point| [0, 1].map(|k| (p[k] - from[k]).abs()).iter().sum::<i32>();
     let within =
