@@ -64,7 +64,7 @@ pub struct FunnelInput<'a> {
 }
 
 impl<'a> FunnelInput<'a> {
-    /// Input with all defaults for a chain, on at most `most_views` views.
+    /// Input for all measurements around a chain, on at most `most_views` views.
     pub fn new(
         setting: &'a Setting,
         chain: Chain,
