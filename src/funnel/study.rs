@@ -26,7 +26,7 @@ const BYTES_PER_SAMPLE: u64 = 450;
 
 /// Bytes per solid box that the chain leaves in a view; 1,480 were measured.
 ///
-/// Includes its triangles with all their back ends, orders and fragments.
+/// Includes its triangles with all their back ends, and fragments.
 const BYTES_PER_LEFT: f64 = 1600.0;
 
 /// Rejects images that need more memory than is available.

@@ -456,7 +456,7 @@ pub(super) fn facts(machine: &Machine, tools: &Toolchain) -> Vec<Fact> {
         (of_machine, "cpu", true, known(&machine.cpu)),
         (of_machine, "cores", true, machine.cores.to_string()),
         (of_machine, "caches", true, caches),
-        (of_machine, "instruction set", true, vectors),
+        ("run", "instruction set", false, vectors),
         (of_machine, "os kernel", false, known(&machine.kernel)),
         (of_tools, "rustc", false, known(&tools.rustc)),
         (of_tools, "target", false, known(&tools.target)),
