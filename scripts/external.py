@@ -4,7 +4,7 @@
 usage: scripts/external.py CULLBENCH [--only WORD]
 
 CULLBENCH is an optimised program. Takes about five minutes and 4 GB; rows on Sponza need
-`scripts/fetch.py sponza`. --only prints the rows whose name contains WORD and writes nothing.
+`scripts/fetch.py sponza`. --only prints the rows whose function below contains WORD and writes nothing.
 """
 
 import csv

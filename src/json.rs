@@ -1,6 +1,6 @@
 //! Reading JSON, with errors that name place, text found and text expected.
 //!
-//! Their words are not those of the reader's program.
+//! Messages do not repeat the wording of the JSON crate.
 
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;

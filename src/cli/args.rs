@@ -66,14 +66,13 @@ pub enum Command {
     Funnel(FunnelArgs),
     /// Recommend a structure, a test and work to skip for a scene, with the evidence
     Advise(AdviseArgs),
-    /// Measure errors of camera updates (turns, spring arms) after up to ten million
-    /// steps
+    /// Measure errors of camera updates (turns, spring arms) after millions of steps
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, and check their declared outcomes
     Stress(StressArgs),
     /// Write a scene with the verdicts along a path as a page in 3-D
     View(ViewArgs),
-    /// Inspect, generate or convert scenes
+    /// Inspect, draw, generate or convert scenes
     #[command(subcommand)]
     Scene(SceneCommand),
     /// Show the machine, toolchain and source as recorded in reports

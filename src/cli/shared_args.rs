@@ -290,8 +290,8 @@ pub struct LensArgs {
     /// Width / height for cameras without one [default: 1.778, 16 by 9]
     #[arg(long, value_parser = values::above_zero)]
     pub aspect: Option<f64>,
-    /// Near plane for cameras without one [default: far / 1000, 0.1 for street; at
-    /// most that of the default far, for recorded cameras twice the scene's diagonal /
+    /// Near plane for cameras without one [default: far / 1000, 0.1 for street;
+    /// at most the default far / 1000, for recorded cameras 2 x the scene's diagonal /
     /// 1000]
     #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
@@ -302,8 +302,8 @@ pub struct LensArgs {
     pub far: Option<f64>,
     /// Convention of cameras given as matrices (columns m00 to m33: row, column):
     /// column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d
-    /// (clip = x M); reversed depth and infinite far are recognised, but -reversed behind
-    /// the name tells of reversed depth of orthographic matrices
+    /// (clip = x M); reversed depth and infinite far are recognised; append -reversed for
+    /// orthographic matrices with reversed depth
     #[arg(long, value_name = "NAME", value_parser = values::choice("matrix convention", &MATRIX_CONVENTIONS))]
     pub matrix_convention: Option<MatrixConvention>,
 }

@@ -86,7 +86,7 @@ fn basis_of_times(report: &Report) -> String {
             of_planned(counted(least, "process"))
         );
     }
-    let few = ["", "; fewer than ten make wide intervals"][usize::from(least < 10)];
+    let few = ["", "; with fewer than ten the intervals are broad"][usize::from(least < 10)];
     let over = of_planned(format!("{least} processes"));
     let twins = report.noise.twins.iter();
     let twins: Vec<bool> = twins.filter_map(|twin| twin.holds_one()).collect();

@@ -15,7 +15,7 @@ pub const MAX_PLANES: usize = 32;
 ///
 /// A node that lies wholly inside plane i has children with a mask without
 /// bit i (Assarsson and Moeller 2000, "Optimized view frustum culling
-/// algorithms for bounding boxes", Journal of Graphics Tools 5(1), p. 15).
+/// algorithms for bounding boxes", Journal of Graphics Tools 5(1), pp. 9-22).
 pub type PlaneMask = u32;
 
 named! {

@@ -177,7 +177,7 @@ impl From<&Plane> for PlaneF64 {
     }
 }
 
-/// BoxCorner of a box: on each axis the upper bound, or else the lower one.
+/// Corner of a box: on each axis the upper bound, or else the lower one.
 ///
 /// The p-vertex of a plane (the corner farthest along its normal) is the same corner of
 /// every box, and so three fixed rows of a block.

@@ -66,7 +66,7 @@ pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, of, summary
     "cull_rate", "1", Of::Count, "1 - returned/total, mean over the path";
     "query_ns", "ns", Of::Time(TaskKind::Query), "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
     "query_ns_p5", "ns", Of::Tail(0.05), "as query_ns_p95, 5th percentile";
-    "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures, of the median of each group, times query_ns / the mean over the groups; absent below twenty groups, as of short queries, of which many make a group";
+    "query_ns_p95", "ns", Of::Tail(0.95), "95th percentile over groups of cameras that are the same for all structures, of the median of each group, times query_ns / the mean over the groups; absent below 20 groups; short queries share a group, so they have few";
     "query_ns_p99", "ns", Of::Tail(0.99), "as query_ns_p95, 99th percentile";
     "query_ns_max", "ns", Of::Tail(1.0), "slowest group of cameras";
     "query_wall_ns", "ns", Of::Wall(TaskKind::Query), "as query_ns, wall time";

@@ -166,7 +166,7 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, fr
 };
 
 /// Parameters that every generated path takes.
-pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16 by 9), near=far/1000 (at most that of the default far), \
+pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (degrees), aspect=1.778 (16 by 9), near=far/1000 (at most the default far / 1000), \
      far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that the six-plane test returns this share of the items on average, \
      false positives included, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 

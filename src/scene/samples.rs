@@ -47,7 +47,7 @@ pub static SAMPLES: &[Sample] = rows! { Sample { name, licence, unit, summary, f
         "11,065 objects of central Helsinki in metres",
         "helsinki_boxes.csv", include_bytes!("../../datasets/helsinki_boxes.csv");
     "us-counties", "ISC", "degrees",
-        "3,510 flat county boxes in degrees, sizes 1 : 10,000",
+        "3,510 flat county boxes in degrees, sizes 1 : 10,000, six of 0",
         "us_counties_boxes.csv", include_bytes!("../../datasets/us_counties_boxes.csv");
 };
 
