@@ -33,8 +33,9 @@ pub trait BoxTest {
     }
     /// This item belongs to the answer.
     fn admits(&self, item: &Aabb) -> bool;
-    /// Bounds of the centres of answers, if no item extends farther than `half` from
-    /// its centre and all lie in `scene`.
+    /// Bounds of the centres of answers.
+    ///
+    /// No item extends farther than `half` from its centre, and all lie in `scene`.
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb;
     /// Number of planes per test.
     fn planes(&self) -> u32 {
@@ -42,8 +43,9 @@ pub trait BoxTest {
     }
 }
 
-/// A volume with THE plane test in f32 and at most eight planes, all of them at
-/// once. Nodes and items are tested alike.
+/// THE plane test in f32 against at most eight planes at once.
+///
+/// Nodes and items are tested alike.
 impl BoxTest for PlaneRows {
     #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
@@ -72,7 +74,7 @@ impl BoxTest for PlaneRows {
 
 /// Any other volume, plane by plane: correct, not fast.
 ///
-/// Searched for as `dyn` [`BoxTest`]: a traversal is compiled once for all of them.
+/// Used as `dyn` [`BoxTest`], so that one compiled traversal serves all of them.
 struct PlaneByPlane<'a, Q>(&'a Q);
 
 impl<Q: QueryVolume> BoxTest for PlaneByPlane<'_, Q> {
@@ -125,7 +127,7 @@ impl<T: BoxTest + ?Sized, C: Context> BoxQuery<'_, T, C> {
     /// Counts tests of nodes.
     #[inline(always)]
     pub fn count_nodes(&mut self, count: u32) {
-        // Not without counters: the planes of a `dyn` test take a call.
+        // Only with counters on: the planes of a `dyn` test take a call.
         if size_of::<C::Recorder>() != 0 {
             self.cx.recorder().nodes_tested(count);
             let planes = count * self.test.planes();
@@ -176,8 +178,7 @@ pub trait BoxTested: Sized + Send + Sync {
 
     /// Builds it over all items that are not empty.
     ///
-    /// # Errors
-    /// If it cannot hold them.
+    /// # Errors If it cannot hold the items.
     fn of(items: Vec<Record>, params: &Self::Params) -> Result<Self, BuildError>;
 
     /// Its [`RegionIndex::refit`]; `None` if a rebuild is needed.

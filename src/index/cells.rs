@@ -1,4 +1,4 @@
-//! Cells of structures, for pictures, and the verdicts of a query about them.
+//! Cells of structures, for pictures, and how a query classifies them.
 
 use crate::geometry::{Aabb, Plane};
 use crate::query::{AnyVolume, Containment, ItemId, NoRecorder, Predicate, each_volume};
@@ -8,20 +8,20 @@ use crate::query::{AnyVolume, Containment, ItemId, NoRecorder, Predicate, each_v
 pub struct TreeCell<'a> {
     /// Number of cells around it: 0 for a root.
     pub level: u32,
-    /// Closed bounds of all items of the cell, as a query tests them.
+    /// Closed bounds of all items of the cell; queries test these.
     pub bounds: Aabb,
-    /// Half-space of the cell within the cell around it, if a plane divides that.
+    /// Half-space of the cell within its parent, if a plane divides the parent.
     pub half_space: Option<Plane>,
-    /// Items that the cell keeps itself, without those of the cells in it.
+    /// Items of the cell itself, without those of its child cells.
     pub items: &'a [ItemId],
 }
 
-/// Verdicts about cells in depth-first order by a query with a volume of planes.
+/// Classifies cells in depth-first order against a volume of planes.
 ///
-/// `None` for a cell that is not tested because the cell around it is outside or inside.
+/// `None` for a cell that is not tested because its parent is outside or inside.
 pub fn verdicts(cells: &[TreeCell<'_>], volume: AnyVolume<'_>) -> Vec<Option<Containment>> {
     each_volume!(volume, volume => {
-        // Open planes of the cells of a level, as long as the cells around straddle.
+        // Open planes of the cells of a level, as long as their parents straddle.
         let mut masks = vec![volume.mask()];
         let verdict = |cell: &TreeCell<'_>| {
             let level = cell.level as usize;

@@ -1,21 +1,24 @@
 //! Bounds of the centres of a query's answers.
 //!
-//! For an index that searches boxes or cells only. Every item that the six-plane test sees has
-//! its centre within them; not every item within them is seen.
+//! For indexes that search boxes or cells only. The centre of every item that the six-plane test
+//! sees lies within them; the converse does not hold.
 
 use glam::{DVec3, Vec3};
 
 use crate::geometry::{Aabb, Plane, PlaneF64, PlaneRows, ROW_LANES};
 
-/// Share of the scene's size by which results are widened: far more than the
-/// rounding of the corners, far less than an item.
+/// Share of the scene's size by which results are widened.
+///
+/// Far more than the rounding of the corners, far less than an item.
 const SLACK: f64 = 1e-5;
-/// Corners whose planes are nearer to parallel than this (as the determinant
-/// of their unit normals) cannot be trusted: what they err by is some 1e-15 of the
-/// scene's size over that, a tenth of the [`SLACK`] here.
+/// Least determinant of three unit normals whose corner is trusted.
+///
+/// The error of a corner is about 1e-15 of the scene's size divided by the determinant: here a
+/// tenth of [`SLACK`].
 const LEAST_DETERMINANT: f64 = 1e-9;
-/// Coordinates and plane values beyond this might overflow in f32, where the
-/// plane test then excludes nothing.
+/// Most of a coordinate or plane value.
+///
+/// Beyond this f32 may overflow, and then the plane test excludes nothing.
 const MOST: f64 = 1e37;
 
 /// The centres of the boxes that hold `p`.
@@ -27,10 +30,9 @@ pub fn of_point(p: Vec3, half: Vec3, scene: &Aabb) -> Aabb {
 
 /// The centres of the boxes that no plane excludes.
 ///
-/// A box that passes has `n . c + d + |n| . half >= 0` (the p-vertex, written
-/// about the centre) but for the rounding of the plane test, for every plane:
-/// its centre lies in the polyhedron of the planes moved outward. That one
-/// within the scene is bounded, and the bounds of its corners are its own.
+/// A box passes a plane if `n . c + d + |n| . half >= 0` (the p-vertex, written about the centre),
+/// up to the rounding of the plane test. So its centre lies in the polyhedron of the planes moved
+/// outward. Clipped to the scene this is bounded, and its bounds are those of its corners.
 /// O(planes^4), some microseconds for a frustum.
 pub fn of_planes(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Aabb {
     corners_within(rows, half, scene).unwrap_or(*scene)
@@ -39,7 +41,7 @@ pub fn of_planes(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Aabb {
 /// The planes of a view and the faces of the scene.
 const MOST_HALVES: usize = ROW_LANES + 6;
 
-/// `None` where the corners cannot be computed with confidence.
+/// The bounds; `None` if the corners cannot be computed reliably.
 fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
     let reach = scene.reach().as_dvec3();
     let size = reach.max_element();
@@ -73,8 +75,8 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
                     continue;
                 }
                 let scaled = crossed[i][k] * b.d - crossed[j][k] * a.d - line * c.d;
-                // Outside the scene without a doubt, as where the near plane
-                // meets the far one, which rounding left not quite parallel.
+                // Certainly outside the scene, as where rounding lets nearly parallel near and far
+                // planes meet.
                 if scaled.abs().max_element() > 2.0 * size * (determinant.abs() + 1e-12) {
                     continue;
                 }
@@ -92,12 +94,13 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
     Some(widened(min, max, size))
 }
 
-/// The plane that the centres obey, normalised; `None` within if it constrains
-/// nothing, `None` if it may overflow or can never be met.
+/// The plane that the centres obey, normalised.
+///
+/// `Some(None)` if it constrains nothing; `None` if it may overflow or cannot be met.
 fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<PlaneF64>> {
     let (normal, d) = (plane.normal.as_dvec3(), f64::from(plane.d));
     let largest = normal.abs().dot(reach) + d.abs();
-    // All finite, so never a NaN.
+    // All finite: no NaN.
     if largest >= MOST {
         return None;
     }
@@ -105,13 +108,13 @@ fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<Plan
     if length == 0.0 {
         return if d >= 0.0 { Some(None) } else { None };
     }
-    // Three products and three sums of f32 err by less than this.
+    // Error bound of three products and three sums in f32.
     let error = 1e-6 * largest + 1e-30;
     let d = d + normal.abs().dot(half) + error;
     Some(Some(PlaneF64::new(normal / length, d / length)))
 }
 
-/// In f32 and wider by the slack.
+/// Rounds to f32, wider by the slack.
 fn widened(min: DVec3, max: DVec3, size: f64) -> Aabb {
     let slack = DVec3::splat(SLACK * size + f64::from(f32::MIN_POSITIVE));
     Aabb::new((min - slack).as_vec3(), (max + slack).as_vec3())
@@ -138,7 +141,7 @@ mod tests {
         fn no_item_of_the_answer_has_its_centre_outside(
             items in prop::collection::vec(item(), 1..40),
             planes in prop::collection::vec((vector(1.0), vector(40.0)), 0..=ROW_LANES / 2),
-            // For each a second one, nearly parallel to it or to its other side.
+            // For each plane a second one, nearly parallel or antiparallel to it.
             seconds in prop::collection::vec(
                 (any::<bool>(), -9i32..-3, vector(1.0), vector(40.0)),
                 0..=ROW_LANES / 2,
@@ -183,8 +186,9 @@ mod tests {
         assert!(off.max_element() < 0.1, "{centres:?}");
     }
 
-    /// Turned anyhow, so that rounding leaves the near plane and the far one not
-    /// quite parallel: they meet far outside, and that corner says nothing.
+    /// Rotations that leave the near and far planes not quite parallel.
+    ///
+    /// They meet far outside the scene; that corner must be ignored.
     #[test]
     fn a_frustum_is_bounded_however_it_is_turned() {
         let scene = Aabb::around(Vec3::ZERO, Vec3::splat(1000.0));

@@ -35,7 +35,7 @@ pub enum BuildError {
     TooManyItems {
         /// Number of items.
         count: usize,
-        /// Number of ids there are.
+        /// Number of ids available.
         most: usize,
     },
     /// The build would take unreasonable time or memory.
@@ -66,7 +66,7 @@ pub enum BuildError {
         /// Message of the panic.
         message: String,
     },
-    /// A parameter is unknown, unreadable or out of range.
+    /// A parameter is unknown, malformed or out of range.
     #[error("parameters of '{structure}': {reason}")]
     Params {
         /// Name of the structure.
@@ -98,7 +98,7 @@ impl MemoryUsage {
 /// such as [`REMOVED`](crate::motion::REMOVED), is an item that no query ever returns.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Input<'a> {
-    /// The bounds of all items.
+    /// Bounds of all items.
     pub items: &'a [Aabb],
     /// The scene's own partition, such as a map's planes.
     pub own_tree: Option<&'a PlaneTree>,
@@ -172,61 +172,62 @@ pub trait RegionIndex: Sized + Send + Sync {
     const INFO: Info;
     /// Build parameters, `name:key=value` on the command line.
     ///
-    /// Keys that are not given have the values of `Default`, others are refused. A field `threads` is the number of threads that share one query.
+    /// Missing keys take the values of `Default`; unknown keys are refused. A field `threads` is
+    /// the number of threads that share one query.
     type Params: Default + Serialize + DeserializeOwned;
 
-    /// Builds the structure. Deterministic: the same items and parameters give
-    /// the same structure, whatever the number of threads.
+    /// Builds the structure.
     ///
-    /// # Errors
-    /// An item with a NaN or infinite bound (named), more items than ids,
-    /// parameters out of range.
+    /// Deterministic: the same items and parameters give the same structure for any number of
+    /// threads.
+    ///
+    /// # Errors An item with a NaN or infinite bound (named), more items than ids, parameters out
+    /// of range.
     fn build(input: &Input<'_>, params: &Self::Params) -> Result<Self, BuildError>;
 
     /// Heap bytes.
     fn memory(&self) -> MemoryUsage;
 
-    /// Passes every item that the volume sees to the sink of the context: exactly
-    /// the set `{ i : volume.sees(items[i]) }`, bit for bit, each id once, in the
+    /// Passes every item that the volume sees to the sink of the context.
+    ///
+    /// Exactly the set `{ i : volume.sees(items[i]) }`, bit for bit, each id once, in the
     /// structure's own order. `Break` if the sink ended the query.
     ///
-    /// The volume is a frustum in any form, a point (region search: every item
-    /// whose closed box holds it) or a box (every item that shares a point with
-    /// it). Mark the function and what it calls `#[inline(always)]`:
-    /// [`DynIndex`](super::DynIndex) compiles it for each [`Kernel`], and a call
-    /// that stays a call runs portable code.
+    /// The volume is a frustum in any form, a point (region search: every item whose closed box
+    /// holds it) or a box (every item that shares a point with it). Mark the function and its
+    /// callees `#[inline(always)]`: [`DynIndex`](super::DynIndex) compiles it for each [`Kernel`],
+    /// and a callee that is not inlined runs portable code.
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, context: &mut C) -> ControlFlow<()>;
 
-    /// Region search for many points: adds the ids of each point, in the order of
-    /// [`RegionIndex::query`], point after point.
+    /// Region search for many points: appends the ids of each point to `out`.
     ///
-    /// The default searches point by point; a structure that interleaves several descents
-    /// overrides it.
+    /// Per point in the order of [`RegionIndex::query`]. The default searches point by point; a
+    /// structure that interleaves several descents overrides it.
     #[inline(always)]
     fn query_many<I: Isa>(&self, isa: I, points: &[Vec3], out: &mut Located) {
         let mut ids = Vec::new();
         for p in points {
             ids.clear();
-            // A Vec never breaks off.
+            // A Vec never ends the query.
             let _ = self.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
             out.push(&ids);
         }
     }
 
-    /// Takes over the new bounds of `moved` items without a new build.
+    /// Takes over the new bounds of `moved` items without a rebuild.
     ///
-    /// `items` holds the bounds of all items, the new ones included: finite, and as many as
-    /// were built. Ids are below their number; others may panic, and
-    /// [`StructureSpec::update`](super::StructureSpec::update) refuses them. `moved` may be
-    /// empty, as before the first frame of a motion; it has any order and may name an item
-    /// twice. Returns false, with the structure unchanged, if a rebuild is needed. A structure
-    /// may return false where an item becomes or ceases to be empty; one that does not declare
-    /// `refits` in its [`Info`] always does.
+    /// `items` holds the bounds of all items, the new ones included: finite, and as many as were
+    /// built. Ids are below their number; others may panic, and
+    /// [`StructureSpec::update`](super::StructureSpec::update) refuses them. `moved` may be empty,
+    /// as before the first frame of a motion; it has any order and may name an item twice. Returns
+    /// false, with the structure unchanged, if a rebuild is needed. A structure may return false if
+    /// an item becomes or ceases to be empty; one that does not declare `refits` in its [`Info`]
+    /// always does.
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }
 
-    /// The choice of a structure that chooses, and what it left out, in a phrase.
+    /// A phrase for the choice of an adaptive structure and the options it rejected.
     fn chose(&self) -> Option<String> {
         None
     }
@@ -285,7 +286,8 @@ pub trait FrustumQuery: RegionIndex {
     }
 
     /// [`FrustumQuery::visible`] with the cost of the query, by the portable kernel.
-    /// Ids and cost are the same by all kernels.
+    ///
+    /// Ids and cost are the same with every kernel.
     fn counted<Q: QueryVolume>(&self, volume: &Q) -> (Vec<ItemId>, QueryCost) {
         let (mut ids, mut cost) = Default::default();
         let _ = self.query(volume, &mut QueryContext::new(Plain, &mut ids, &mut cost));
@@ -298,6 +300,7 @@ pub trait FrustumQuery: RegionIndex {
     }
 
     /// Passes every item that the volume sees to the sink.
+    ///
     /// `Break` if the sink ended the query.
     fn query_into<Q: QueryVolume, S: Sink>(&self, volume: &Q, sink: &mut S) -> ControlFlow<()> {
         Kernel::best().run(Query {
@@ -308,10 +311,10 @@ pub trait FrustumQuery: RegionIndex {
         })
     }
 
-    /// [`FrustumQuery::visible`] as ranges of the returned order
-    /// ([`RegionIndex::tree_order`]), appended to `ranges`; together they hold
-    /// each visible item once. Adjoining ranges that follow each other are one.
-    /// `None` from a structure without such an order.
+    /// [`FrustumQuery::visible`] as ranges of the returned order, appended to `ranges`.
+    ///
+    /// The order is [`RegionIndex::tree_order`]. Together the ranges hold each visible item once;
+    /// consecutive adjoining ranges are merged. `None` from a structure without such an order.
     fn visible_ranges<Q: QueryVolume>(
         &self,
         volume: &Q,

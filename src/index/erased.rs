@@ -1,7 +1,7 @@
-//! [`DynIndex`], the object type of all structures, and how it is updated.
+//! [`DynIndex`], the object type of all structures, and its update policies.
 //!
-//! Dispatch happens once per query, never per node: behind each method is a traversal
-//! compiled for that structure, volume, recorder and instruction set.
+//! Dispatch happens once per query, never per node: behind each method is a traversal compiled for
+//! that structure, volume, recorder and instruction set.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,8 +19,7 @@ use crate::spec::SpecError;
 
 /// Runs a closure; returns the message of a panic.
 ///
-/// The state that the closure has changed by then stays as it is and must not be relied
-/// upon.
+/// State that the closure changed before the panic is kept and must not be relied upon.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
@@ -70,7 +69,7 @@ impl FromStr for UpdatePolicy {
 }
 
 defaults! {
-    /// Kernel of queries and number of threads of builds. Answers do not depend on it.
+    /// Kernel of queries and number of threads of builds; answers depend on neither.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
     pub struct Execution {
         /// Instruction set of queries.
@@ -88,8 +87,8 @@ pub trait DynIndex: Send + Sync {
     fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>);
     /// The same query; adds its cost to `cost`.
     ///
-    /// Runs on the portable instruction set, as cost and answer do not depend on it. All
-    /// volumes of planes share one compiled traversal.
+    /// Runs on the portable instruction set: cost and answer do not depend on it. All volumes of
+    /// planes share one compiled traversal.
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// See [`RegionIndex::query_many`]; clears `out` first.
     fn query_many(&self, points: &[Vec3], out: &mut Located);

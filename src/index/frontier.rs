@@ -27,7 +27,7 @@ pub fn is_far(items: usize) -> bool {
     items > NEAR
 }
 
-/// The entries of a list that are prefetched before its first entry is processed.
+/// The entries of a list that are prefetched before its first one is processed.
 ///
 /// Most entries of a small view.
 #[inline(always)]
@@ -50,14 +50,14 @@ pub fn take<T: Default>(kept: &'static Kept<T>) -> Box<T> {
 /// Returns the memory for the next query.
 #[inline(always)]
 pub fn put_back<T>(kept: &'static Kept<T>, scratch: Box<T>) {
-    // A thread that is about to end keeps nothing.
+    // A thread that is ending keeps nothing.
     let _ = kept.try_with(|kept| kept.set(Some(scratch)));
 }
 
 /// Nodes still to be tested, each with the planes that its ancestors straddle.
 #[derive(Default)]
 pub struct Frontier {
-    /// Longer than `used`, so that sixteen lanes can always be stored.
+    /// Longer than `used`, so that a store of sixteen lanes always fits.
     nodes: Vec<u32>,
     open: Vec<PlaneMask>,
     used: usize,
@@ -128,10 +128,10 @@ impl Frontier {
     }
 }
 
-/// List of nodes that are inside of all planes.
+/// List of nodes that are inside all planes.
 #[derive(Default)]
 pub struct NodeList {
-    /// Longer than `used`, so that sixteen lanes can always be stored.
+    /// Longer than `used`, so that a store of sixteen lanes always fits.
     nodes: Vec<u32>,
     used: usize,
 }
@@ -180,7 +180,7 @@ impl Merger {
         Some(std::mem::replace(&mut self.0, places))
     }
 
-    /// The run at the end, which may be empty.
+    /// The last run, which may be empty.
     #[inline(always)]
     pub fn take(&mut self) -> Range<usize> {
         std::mem::take(&mut self.0)

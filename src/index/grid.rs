@@ -1,8 +1,8 @@
 //! A uniform grid as engines have it: equal cells over the scene.
 //!
-//! Each item is in the cell of its centre, and cells have the exact bounds of their items. A
-//! query visits the cells that its bounds reach. (Grids on crates.io are hash maps for moving
-//! bodies.)
+//! Each item is in the cell of its centre, and cells have the exact bounds of their items. A query
+//! visits the cells within the bounds of the centres of its answers. (Grids on crates.io are hash
+//! maps for moving bodies.)
 
 use std::hint::black_box;
 use std::ops::{ControlFlow, Range};
@@ -19,7 +19,7 @@ use crate::query::{Bits, Context, ItemId, Recorder};
 const ITEMS_PER_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
-/// Cells that are all tested: the bounds of the centres that matter take longer.
+/// Most cells that are all tested: bounding the centres of answers takes longer.
 const FEW_CELLS: usize = 32;
 
 /// A uniform grid: cells in rows along x, items in the order of their cells.
@@ -40,7 +40,7 @@ pub struct UniformGrid {
     half: Vec3,
 }
 
-/// Number of cells along each axis: nearly cubes, flat axes undivided.
+/// Number of cells along each axis: nearly cubic cells, flat axes undivided.
 fn cells_for(extent: Vec3, items: usize) -> UVec3 {
     let extent = extent.as_dvec3();
     let wanted = (items as f64 / ITEMS_PER_CELL).max(1.0);
@@ -48,7 +48,7 @@ fn cells_for(extent: Vec3, items: usize) -> UVec3 {
     loop {
         let volume: f64 = open.iter().map(|&axis| extent[axis]).product();
         let edge = (volume / wanted).powf(1.0 / open.len().max(1) as f64);
-        // An axis shorter than a cell drops out, and the others are cut finer.
+        // An axis shorter than a cell is left undivided, and the others are cut finer.
         let short = |axis: usize| extent[axis] < edge;
         if open.iter().any(|&axis| short(axis)) {
             open.retain(|&axis| !short(axis));
@@ -65,8 +65,9 @@ fn cells_for(extent: Vec3, items: usize) -> UVec3 {
 }
 
 impl UniformGrid {
-    /// The cell of a coordinate on an axis. Monotone: a larger coordinate never
-    /// lies in a lower cell.
+    /// The cell of a coordinate on an axis.
+    ///
+    /// Monotone: a larger coordinate never lies in a lower cell.
     #[inline(always)]
     fn cell_on(&self, axis: usize, coordinate: f32) -> u32 {
         let (low, high) = (self.centres.min[axis], self.centres.max[axis]);
@@ -101,8 +102,8 @@ impl UniformGrid {
         if items.is_empty() {
             return ControlFlow::Continue(());
         }
-        // Opaque, so that each cell reads the planes again: kept in registers from cell to cell,
-        // they are saved and restored around each call of the sink.
+        // Opaque, so that each cell loads the planes again: planes kept in registers from cell to
+        // cell would be saved and restored around each call of the sink.
         let (test, cx) = (black_box(ask.test), &mut *ask.cx);
         let mut ask = BoxQuery { test, cx };
         let (rejected, accepted) = ask.rejects_accepts(&self.bounds[cell]);
@@ -114,8 +115,8 @@ impl UniformGrid {
             ask.cx.recorder().subtree_accepted(items.len());
             return ask.cx.accept(&self.ids[items]);
         }
-        // All tests before the first answer: a call between two of them would cost the
-        // registers that hold the planes.
+        // All tests before the first answer: a call between two tests would evict the planes from
+        // their registers.
         for (start, boxes) in items.clone().step_by(64).zip(self.boxes[items].chunks(64)) {
             let mut admitted = 0_u64;
             for (i, b) in boxes.iter().enumerate() {
@@ -188,7 +189,7 @@ impl BoxTested for UniformGrid {
         if ask.rejects(&self.scene) || self.ids.is_empty() {
             return ControlFlow::Continue(());
         }
-        // Few cells are tested sooner than the bounds of centres that matter are known.
+        // Testing few cells is faster than bounding the centres of the answers.
         let asked = match self.bounds.len() {
             0..=FEW_CELLS => self.centres,
             _ => ask.test.centres(self.half, &self.scene),

@@ -32,13 +32,15 @@ pub struct Info {
     ///
     /// The order is [`RegionIndex::tree_order`](super::RegionIndex::tree_order).
     pub ranges: bool,
-    /// A build makes use of several threads.
+    /// True if a build uses several threads.
     pub threaded_build: bool,
     /// True if only timed when named, or with `all`; not part of the list `default`.
     ///
-    /// A form for comparison, or one that is always another of the list.
+    /// A variant for comparison, or one that is always identical to another of the list.
     pub on_request: bool,
-    /// Timed if named, or by default where items move: its one advantage.
+    /// True if only timed when named, or by default where items move.
+    ///
+    /// Motion is the only advantage of such a structure.
     pub for_motion: bool,
 }
 
@@ -68,7 +70,7 @@ pub enum Origin<Name = String> {
     Ours,
     /// The crate of that name.
     Crate(Name),
-    /// This crate, after code that cannot be called itself.
+    /// This crate, modelled on code that cannot be called itself.
     StandIn(Name),
 }
 

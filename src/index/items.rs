@@ -1,7 +1,7 @@
 //! Non-empty items, which every structure holds: ids, records, positions.
 //!
-//! Records are for builds, positions and changed nodes for refits; rows of sixteen ids are
-//! read with one access to memory.
+//! Records are for builds; positions and changed nodes for refits. A row of sixteen ids is one
+//! cache line.
 
 use std::ops::Deref;
 
@@ -17,12 +17,12 @@ use crate::query::{Bits, ItemId};
 /// # Errors
 /// An item with a NaN or infinite bound; more items than ids.
 pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
-    // The top id stays free as a mark of "none".
+    // The top id is reserved as a mark of "none".
     let (count, most) = (items.len(), ItemId::MAX as usize - 1);
     if count > most {
         return Err(BuildError::TooManyItems { count, most });
     }
-    // One look at each item: large scenes do not fit the cache.
+    // One pass over the items: large scenes do not fit the cache.
     let (mut count, mut all_finite) = (0, true);
     for b in items {
         count += usize::from(!b.is_empty());
@@ -35,7 +35,7 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
     if count == items.len() {
         return Ok((0..count as ItemId).collect());
     }
-    // A structure keeps this list, so no slack.
+    // The structure keeps this list, so it gets no spare capacity.
     let mut ids = Vec::with_capacity(count);
     let sound = items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
     ids.extend(sound.map(|(_, id)| id));
@@ -44,7 +44,7 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
 
 /// An item during a build: bounds and id together.
 ///
-/// A level of the build is then one pass over memory.
+/// So a level of the build is one pass over memory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Record {
     /// Bounds of the item.
@@ -77,7 +77,7 @@ impl Record {
 #[derive(Default)]
 pub struct Positions(Vec<u32>);
 
-/// Position of an item that the structure does not hold; also the id of no item.
+/// Position of an item that is not held; also the id of a vacant lane.
 pub const ABSENT: u32 = u32::MAX;
 
 /// Distance of prefetches in a list of moved items.
@@ -110,10 +110,10 @@ impl Positions {
         self.0[id as usize] = position;
     }
 
-    /// Prefetches the moved items that follow the i-th.
+    /// Prefetches for the moved items after the i-th; returns one's position.
     ///
-    /// Positions and bounds of the one two distances ahead. Returns the position of the one
-    /// a single distance ahead.
+    /// Loads the position of the item [`MOVED_AHEAD`] ahead, which it returns, and prefetches the
+    /// position and bounds of the one twice as far.
     #[inline(always)]
     pub fn ahead(&self, items: &[Aabb], moved: &[ItemId], i: usize) -> Option<usize> {
         if let Some(&id) = moved.get(i + 2 * MOVED_AHEAD)
@@ -136,27 +136,27 @@ impl Positions {
 #[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct IdSet(Vec<u64>);
 
-/// The nodes whose bounds have to be fitted again.
+/// The nodes whose bounds must be recomputed.
 pub type Dirty = IdSet;
 
 impl IdSet {
-    /// None of `nodes` nodes.
+    /// The empty set, with room for `nodes` nodes.
     pub fn none(nodes: usize) -> IdSet {
         IdSet(vec![0; nodes.div_ceil(64)])
     }
 
-    /// Makes it the empty set of ids below `bound`.
+    /// Empties the set and makes room for ids below `bound`.
     pub fn clear(&mut self, bound: usize) {
         self.0.clear();
         self.lengthen(bound);
     }
 
-    /// Makes it a set of as many nodes, more than now.
+    /// Makes room for more nodes.
     pub fn lengthen(&mut self, nodes: usize) {
         self.0.resize(nodes.div_ceil(64), 0);
     }
 
-    /// Adds a node; returns whether it is new.
+    /// Adds a node; returns whether it was absent.
     #[inline(always)]
     pub fn mark(&mut self, node: usize) -> bool {
         let (word, bit) = (&mut self.0[node / 64], 1 << (node % 64));
@@ -193,7 +193,7 @@ impl IdSet {
         self.0.len()
     }
 
-    /// Nodes of a word, ascending; none of a word that does not exist.
+    /// Nodes of a word, ascending; none if the word does not exist.
     #[inline(always)]
     pub fn of_word(&self, word: usize) -> impl DoubleEndedIterator<Item = usize> + use<> {
         let bits = Bits(self.0.get(word).copied().unwrap_or(0));
@@ -205,7 +205,7 @@ impl IdSet {
 #[repr(C, align(64))]
 struct Line([ItemId; LANES]);
 
-/// Ids, the last row of which is padded with zeros.
+/// Ids in rows of sixteen, the last row padded with zeros.
 #[derive(Clone, Default, PartialEq)]
 pub struct PaddedIds {
     lines: Vec<Line>,

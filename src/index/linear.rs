@@ -1,7 +1,7 @@
 //! The linear scans: every box against every plane, O(n).
 //!
-//! `linear-scalar` is the textbook loop. `linear` gives the same answer from blocks of
-//! sixteen boxes and is the reference of every speed-up.
+//! `linear-scalar` is the textbook loop. `linear` gives the same answer from blocks of sixteen
+//! boxes; every speed-up is relative to it.
 
 use std::ops::{ControlFlow, Range};
 
@@ -63,9 +63,9 @@ impl RegionIndex for LinearScalar {
 /// Number of blocks that one call of the sink tests: 64 KiB of ids.
 const BLOCKS_PER_CALL: usize = 1024;
 
-/// Least number of blocks of a scan that threads share: 131,072 items.
+/// Fewest blocks of a scan that threads share: 131,072 items.
 ///
-/// Waking the threads takes as long as scanning half of it.
+/// Waking the threads takes as long as scanning half that number.
 const LEAST_SHARED: usize = 8 * BLOCKS_PER_CALL;
 
 /// The scan over blocks: all planes against sixteen boxes at once, no early exit.
@@ -77,7 +77,7 @@ pub struct Linear {
     positions: Positions,
     /// Spheres of the items, if they are [spheres](Input::spheres).
     balls: Option<BallBlocks>,
-    /// True if the item that reaches farthest has come nearer.
+    /// True if the farthest item has come nearer.
     is_nearer: bool,
     workers: Option<Workers>,
 }
@@ -189,7 +189,7 @@ impl<I: Isa, Q: QueryVolume> Piece<I> for PartOfScan<'_, Q> {
         let end = (first + BLOCKS_PER_CALL).min(scan.boxes.blocks().len());
         let recorder = &mut NoRecorder;
         let mut cx = QueryContext::new(isa, ids, recorder);
-        // A Vec never breaks off.
+        // A Vec never ends the query.
         let _ = scan.scan(first..end, volume, &mut cx);
     }
 }
@@ -248,9 +248,9 @@ impl RegionIndex for Linear {
         self.scan(0..blocks, volume, cx)
     }
 
-    /// O(moved): overwrites their lanes. Items may become or cease to be empty.
+    /// O(moved): overwrites lanes. Items may become or cease to be empty.
     ///
-    /// A pass over all blocks more where the farthest sphere has come nearer.
+    /// One more pass over all blocks if the farthest sphere has come nearer.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.positions.prepare(self.ids.iter(), items.len());
         for (i, &id) in moved.iter().enumerate() {
@@ -281,7 +281,7 @@ impl RegionIndex for Linear {
     }
 }
 
-/// The spheres of a structure for a query, if both have any.
+/// The spheres of a structure for a query, if both have spheres.
 #[inline(always)]
 pub fn seen_by<'t, Q: QueryVolume>(balls: Option<&'t BallBlocks>, volume: &Q) -> Option<Balls<'t>> {
     balls?.seen_by(volume.as_spheres()?)
@@ -342,8 +342,8 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for BlockTests<'_, P, R> {
 
 /// Tests blocks of items and passes runs of visible items to the sink.
 ///
-/// Each block comes with the position of its lane 0 and a mask of the lanes in use.
-/// The leaf test of the packed trees and the region search of `linear`.
+/// Each block comes with the position of its lane 0 and a mask of the lanes in use. This is the
+/// leaf test of the packed trees and the region search of `linear`.
 #[inline(always)]
 pub fn scan_blocks<'b, Q: QueryVolume, C: Context>(
     blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
@@ -372,7 +372,7 @@ mod tests {
     use crate::index::FrustumQuery;
     use glam::Vec3;
 
-    /// Else the sphere test asks the exact test of every item from then on.
+    /// Otherwise the sphere test would run the exact test for every item from then on.
     #[test]
     fn an_item_that_was_far_once_is_forgotten() {
         let cube = |at: usize| Aabb::new(Vec3::splat(at as f32), Vec3::splat(at as f32 + 1.0));
@@ -381,7 +381,7 @@ mod tests {
             let input = Input::new(&items).spheres(true);
             let mut scan = Linear::build(&input, &LinearParams::default()).unwrap();
             let last = count - 1;
-            // There and back, there and removed.
+            // There and back; there and removed.
             for bounds in [cube(1 << 23), items[last], cube(1 << 22), Aabb::EMPTY] {
                 items[last] = bounds;
                 assert!(scan.refit(&items, &[last as ItemId]));
@@ -394,7 +394,7 @@ mod tests {
 
     #[test]
     fn lanes_behind_the_last_item_are_dropped_however_many_blocks_there_are() {
-        // A plane across an axis keeps the empty box, where its sum is a NaN.
+        // A plane perpendicular to an axis keeps the empty box, whose sum is a NaN.
         let slab = [Plane::new(Vec3::X, -2.0), Plane::new(-Vec3::X, 40.0)];
         let volumes = [&slab[..], &[]].map(|planes| ConvexVolume::from_planes(planes).unwrap());
         let together = BLOCKS_PER_CALL * LANES;

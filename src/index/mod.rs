@@ -21,7 +21,7 @@
 //! in a crate of your own call [`Registry::with`]; list, run, query, verify, benches and
 //! conformance tests read the registry.
 
-/// `Debug` of structures: their memory, as their arrays would fill pages.
+/// `Debug` of structures: memory only, since their arrays would fill pages.
 macro_rules! debug_by_memory {
     ($([$($generics:tt)*] $structure:ty),*) => {$(
         impl<$($generics)*> std::fmt::Debug for $structure {

@@ -23,9 +23,9 @@ use crate::threads::Pool;
 
 /// Name in a list that stands for all structures.
 const ALL: &str = "all";
-/// Name in a list that stands for those timed by default in still scenes.
+/// Name in a list that stands for the structures timed by default in still scenes.
 pub const DEFAULT: &str = "default";
-/// Name in a list that stands for those timed by default where items move.
+/// Name in a list that stands for the structures timed by default where items move.
 pub const MOTION: &str = "motion";
 
 /// A build without the structure's type; parameters are JSON.
@@ -50,10 +50,10 @@ impl Row {
             let mut filled = serde_json::to_value(T::Params::default()).unwrap_or_default();
             match (filled.as_object_mut(), params.as_object()) {
                 (Some(all), Some(given)) => {
-                    // Not the nulls: JSON has no other form of NaN and infinity.
+                    // Without nulls: JSON has no other form of NaN and infinity.
                     all.retain(|_, value| !value.is_null());
-                    // Only a key that serde passes over takes any value; a field's other
-                    // name does not, nor a field that is not serialised.
+                    // Only a key that serde ignores takes any value; the alias of a field does not,
+                    // nor a field that is not serialised.
                     let unknown = given.keys().find(|key| {
                         let mut probe = all.clone();
                         probe.insert((*key).clone(), json!([[]])).is_none()
@@ -66,15 +66,15 @@ impl Row {
                     }
                     all.extend(given.clone());
                 }
-                // Parameters without names, such as `()` or a number.
+                // Parameters that are not a map, such as `()` or a number.
                 (None, Some(given)) if given.is_empty() => {}
                 _ => filled = params.clone(),
             }
             let own = |error| T::Params::deserialize(params).map_err(|_| error);
-            // Filled in, an alias is a key that comes twice.
+            // Once defaults are filled in, an alias is a duplicate key.
             let read = serde_path_to_error::deserialize(&filled).or_else(own);
             read.map_err(|error: serde_path_to_error::Error<serde_json::Error>| {
-                // serde's message about a value lacks its name.
+                // serde's message about a value lacks its key.
                 let key = error.path().to_string();
                 let (found, expected) = told(error.inner());
                 let found = match filled.get(&key) {
@@ -165,9 +165,8 @@ impl Registry {
 
     /// Adds a structure.
     ///
-    /// # Panics
-    /// If there is one of that name already, or the name cannot be typed: that
-    /// is a mistake of the program, and the message names it.
+    /// # Panics If that name is taken or cannot be typed: a programming error, which the message
+    /// names.
     pub fn with<T: RegionIndex + 'static>(self) -> Registry {
         self.with_row(Row::of::<T>())
     }
@@ -235,8 +234,8 @@ impl Registry {
             execution: Execution::default(),
             policy: UpdatePolicy::default(),
         };
-        // The build checks ranges: a build over no items, which a structure may fail in any
-        // other way and still be sound.
+        // The build checks ranges: a build over no items, which may fail in any other way without
+        // an error here.
         let no_planes = PlaneTree::default();
         let nothing = Input::new(&[]).own_tree(Some(&no_planes));
         match has_given.then(|| spec.build(nothing)) {
@@ -253,12 +252,10 @@ impl Registry {
 
     /// The structures of a comma-separated list.
     ///
-    /// `all` are all of them, `motion` those that are not [on request](Info::on_request),
-    /// and `default` those of `motion` that are of use in [still scenes](Info::for_motion)
-    /// too.
+    /// `all` are all of them, `motion` those that are not [on request](Info::on_request), and
+    /// `default` those of `motion` that are not only [for motion](Info::for_motion).
     ///
-    /// # Errors
-    /// The errors of [`Registry::structure`]; an empty list, a structure named twice.
+    /// # Errors The errors of [`Registry::structure`]; an empty list, a structure named twice.
     pub fn structures(&self, list: &str) -> Result<Vec<StructureSpec>, SpecError> {
         let mut chosen: Vec<StructureSpec> = Vec::new();
         for text in Spec::split_list(list) {
@@ -298,17 +295,16 @@ pub struct StructureSpec {
     ///
     /// The best kernel and one thread unless changed by [`StructureSpec::by`].
     pub execution: Execution,
-    /// Work of a frame of a motion.
+    /// Policy of updates after items have moved.
     pub policy: UpdatePolicy,
 }
 
 impl StructureSpec {
     /// A structure of the built-in registry.
     ///
-    /// [`Registry::structure`] finds those of others.
+    /// [`Registry::structure`] finds those of other registries.
     ///
-    /// # Errors
-    /// The errors of [`Registry::structure`].
+    /// # Errors The errors of [`Registry::structure`].
     pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
         Registry::builtin().structure(text)
     }
@@ -318,9 +314,9 @@ impl StructureSpec {
         StructureSpec { execution, ..self }
     }
 
-    /// Threads that share one query: the parameter `threads`, 1 without it.
+    /// Threads that share one query: the parameter `threads`, by default 1.
     ///
-    /// The name is reserved for it: see [`RegionIndex::Params`].
+    /// The name is reserved: see [`RegionIndex::Params`].
     pub fn query_threads(&self) -> usize {
         self.params["threads"].as_u64().unwrap_or(1) as usize
     }
@@ -343,8 +339,7 @@ impl StructureSpec {
         let input = input.into();
         let count = input.items.len();
         let needed = count.saturating_mul(self.info().build_bytes());
-        // Reserved and released unused: an allocation that fails later would end the
-        // program.
+        // Reserved and released unused: a later allocation failure would abort the program.
         let mut room = Vec::<u8>::new();
         if room.try_reserve_exact(needed).is_err() {
             let structure = self.info().name;
@@ -359,15 +354,14 @@ impl StructureSpec {
         caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }
 
-    /// Updates an index after items have moved.
+    /// Updates an index after items have moved; returns true for a refit.
     ///
-    /// Refits if the structure can, else builds again. True for a refit. There are
-    /// as many items as it was built over; another number needs [`StructureSpec::build`].
+    /// Refits if the structure can, else rebuilds. The number of items must be that of the build;
+    /// another number needs [`StructureSpec::build`].
     ///
-    /// # Errors
-    /// A moved item with a NaN or infinite bound, or one that is not among `items`: the index
-    /// is unchanged. The errors of [`StructureSpec::build`], and a refit that panics: the index
-    /// answers nothing reliable until it is built again.
+    /// # Errors A moved item with a NaN or infinite bound, or an id out of range: the index is
+    /// unchanged. The errors of [`StructureSpec::build`], and a refit that panics: the index is
+    /// unreliable until it is rebuilt.
     pub fn update(
         &self,
         index: &mut Box<dyn DynIndex>,

@@ -1,4 +1,4 @@
-//! One query shared among threads, in parts with lists of their own.
+//! One query shared among threads, in parts with one list each.
 //!
 //! Lists are passed to the sink in order, so answers do not depend on which thread is faster.
 
@@ -10,10 +10,9 @@ use super::{BuildError, check_range};
 use crate::query::{Context, ItemId};
 use crate::threads::{MOST_THREADS, Workers};
 
-/// The threads of a structure's queries; `None` for one.
+/// The threads of a structure's queries; `None` for a single thread.
 ///
-/// # Errors
-/// A number out of range, or one that the system does not give.
+/// # Errors A number out of range, or threads that the system cannot create.
 pub fn workers(threads: usize, structure: &'static str) -> Result<Option<Workers>, BuildError> {
     let most = MOST_THREADS as f64;
     check_range(structure, "threads", threads as f64, 1.0, most)?;

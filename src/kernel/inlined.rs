@@ -1,11 +1,10 @@
-//! Functions of std again, always inlined.
+//! Functions of std, always inlined.
 //!
-//! `Zip::new`, `<[T; N]>::map` and `array::from_fn` are not `#[inline]`: where they
-//! end up in another unit of code generation than the kernel that uses them, they are
-//! calls, compiled for the portable instruction set, and every vector goes through
-//! memory around them. That made the trees 15 % slower and is why kernels use these. Any
-//! other inner loop pays for the call: rays of the sample truth took twice as long, verdicts
-//! of the oracle up to fourteen times. (A closure that is called where it stands is inlined.)
+//! `Zip::new`, `<[T; N]>::map` and `array::from_fn` are not `#[inline]`. In another codegen unit
+//! than the kernel that uses them they become calls, compiled for the portable instruction set, and
+//! every vector goes through memory around the call. Measured: trees 15 % slower, rays of the
+//! sample truth 2 times, verdicts of the oracle up to 14 times. (A closure called where it stands
+//! is inlined.)
 
 /// Equivalent of `a.iter().zip(b)`.
 #[inline(always)]

@@ -14,9 +14,9 @@ pub fn first_lanes(count: usize) -> LaneMask {
 
 /// An instruction set: sixteen f32 lanes and sixteen u32 lanes.
 ///
-/// Every operation but [`Isa::near_mul_add`] rounds once, to nearest, lane by lane; code
-/// written with these operations has bit-identical results on every instruction set. A value
-/// of such a type is the proof that the processor supports the instructions.
+/// Every operation but [`Isa::near_mul_add`] rounds once, to nearest, lane by lane: results are
+/// bit-identical on every instruction set. A value of the type proves that the processor supports
+/// the instructions.
 pub trait Isa: Copy + Send + Sync {
     /// True if the registers hold the coefficients of six planes and a block.
     const MANY_REGISTERS: bool = false;
@@ -25,7 +25,7 @@ pub trait Isa: Copy + Send + Sync {
     type Floats: Copy;
     /// Sixteen u32.
     type Words: Copy;
-    /// Some of sixteen lanes, as comparisons leave them.
+    /// A set of lanes, in the form that comparisons produce.
     type Kept: Copy;
     /// Appends row after row.
     type Packer<'a>: Pack<'a, Self>;
@@ -40,11 +40,11 @@ pub trait Isa: Copy + Send + Sync {
 
     /// The numbers of a row.
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
-    /// For each lane the number at its place in a table and the one behind it; of a
-    /// place without two, the last two of the table.
+    /// Per lane, `table[place]` and the number after it.
     ///
-    /// # Panics
-    /// If the table has fewer than two.
+    /// A place without a successor yields the last two numbers of the table.
+    ///
+    /// # Panics If the table has fewer than two.
     fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [Self::Floats; 2];
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
@@ -61,21 +61,19 @@ pub trait Isa: Copy + Send + Sync {
     fn near_mul_add(self, a: Self::Floats, b: Self::Floats, c: Self::Floats) -> Self::Floats {
         self.add(self.mul(a, b), c)
     }
-    /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
-    /// number.
+    /// `a` where `a < b`, else `b`; the number if `a` is a NaN and `b` is not.
     fn min(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
-    /// `a` where `a > b`, else `b`: of a NaN and a number in this order, the
-    /// number.
+    /// `a` where `a > b`, else `b`; the number if `a` is a NaN and `b` is not.
     fn max(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a - |b|`, rounded once.
     fn sub_abs(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// All lanes.
     fn keep_all(self) -> Self::Kept;
-    /// Those of the lanes where not `values < least`: a NaN stays.
+    /// Clears the lanes where `values < least`; lanes with a NaN stay.
     fn keep(self, kept: Self::Kept, values: Self::Floats, least: Self::Floats) -> Self::Kept;
     /// One bit per lane that is kept.
     fn kept(self, kept: Self::Kept) -> LaneMask;
-    /// The lanes where not `values < least`: a NaN stays.
+    /// The lanes where not `values < least`, those with a NaN included.
     #[inline(always)]
     fn not_below(self, values: Self::Floats, least: f32) -> LaneMask {
         self.kept(self.keep(self.keep_all(), values, self.splat(least)))
@@ -99,13 +97,14 @@ pub trait Isa: Copy + Send + Sync {
     ) -> Self::Words;
     /// The lanes that are `x`.
     fn equal(self, words: Self::Words, x: u32) -> LaneMask;
-    /// Moves the words of `lanes` together, lowest first, to the start of
-    /// `place`; the rest of it holds anything.
+    /// Moves the words of `lanes` to the start of `place`, lowest lane first.
+    ///
+    /// The rest of `place` is unspecified.
     fn compress(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
     /// Appends the words of `lanes`, lowest first.
     #[inline(always)]
     fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        // Room first: a register would not outlive the call that makes it.
+        // Reserve first: a register would not outlive the call that makes it.
         Self::Packer::onto(out, 0).push(self, row, lanes);
     }
 }
@@ -115,22 +114,21 @@ pub trait Piece<I: Isa> {
     /// Result of the piece.
     type Output;
 
-    /// `#[inline(always)]`, as all that is hot in it.
+    /// `#[inline(always)]`, like all hot functions in it.
     fn run(self, isa: I) -> Self::Output;
 }
 
 /// Appends rows and some lanes of rows to a list.
 ///
-/// The list has room for all of them from the start; nothing is checked in between. Its
-/// length is set when the packer is dropped.
+/// Room for all of them is reserved once; nothing is checked in between. Dropping the packer sets
+/// the list's length.
 pub trait Pack<'a, I: Isa> {
     /// Reserves room for `words` words, and for the rest of a row behind them.
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self;
 
     /// Appends the words of `lanes`, lowest first.
     ///
-    /// # Panics
-    /// If no row fits any more.
+    /// # Panics If there is no room for another row.
     fn push(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask);
 }
 
@@ -174,7 +172,7 @@ mod tests {
                 isa.compress(&mut place, words, self.lanes);
                 out.extend_from_slice(&place[..self.lanes.count_ones() as usize]);
             }
-            // Between 0 and 2^31, all the rest at a bound.
+            // Between 0 and 2^31; all others are clamped.
             let least = isa.max(a, isa.splat(0.0));
             let whole = isa.whole(isa.min(least, isa.splat(2147483520.0)));
             out.extend(whole.map(|x| x as u32));
@@ -191,7 +189,7 @@ mod tests {
         }
     }
 
-    /// The bits of a number; any NaN is as good as another.
+    /// The bits of a number; all NaNs compare equal.
     fn canonical(x: f32) -> u32 {
         if x.is_nan() {
             f32::NAN.to_bits()
@@ -200,7 +198,7 @@ mod tests {
         }
     }
 
-    /// Room for a number of words, and then these rows and lanes of rows.
+    /// Room for a number of words, then rows with their lanes to append.
     struct Packed<'a>(&'a mut Vec<u32>, usize, &'a [([u32; LANES], LaneMask)]);
 
     impl Work for Packed<'_> {
@@ -218,7 +216,7 @@ mod tests {
     /// Words that each instruction set packs behind a 1, and whether it panicked.
     fn packed(words: usize, rows: &[([u32; LANES], LaneMask)]) -> Vec<(Vec<u32>, bool)> {
         let pack = |run: &dyn Fn(Packed)| {
-            // Memory enough, so that it is the packer that refuses.
+            // Enough memory, so that only the packer can refuse.
             let mut out = Vec::with_capacity(8 * LANES);
             out.push(1);
             let work = Packed(&mut out, words, rows);

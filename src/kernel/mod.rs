@@ -42,10 +42,8 @@ named! {
 
 /// A piece of work that [`Kernel::run`] compiles for each instruction set.
 ///
-/// Its argument `isa` has the vectors of the set.
-///
-/// `run` and all hot functions in it must be `#[inline(always)]`: a function that is not
-/// inlined is compiled for the portable set.
+/// `run` and all hot functions in it must be `#[inline(always)]`: a function that is not inlined is
+/// compiled for the portable set.
 pub trait Work {
     /// Result of the work.
     type Output;
@@ -55,7 +53,7 @@ pub trait Work {
 }
 
 impl Kernel {
-    /// Returns whether this processor (and operating system) runs it. Detected once.
+    /// Returns whether this processor and operating system run it; detected once.
     #[inline]
     pub fn is_available(self) -> bool {
         static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
@@ -75,8 +73,7 @@ impl Kernel {
 
     /// Does the work with this instruction set.
     ///
-    /// With the portable one where the processor lacks it. The result is the same either
-    /// way.
+    /// With the portable one if the processor lacks it. The result is the same.
     #[inline(always)]
     pub fn run<W: Work>(self, work: W) -> W::Output {
         machine::run(self, work)

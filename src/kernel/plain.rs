@@ -20,8 +20,7 @@ fn lanes<T: Copy + Default>(of: impl Fn(usize) -> T) -> [T; LANES] {
 
 #[inline(always)]
 fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
-    // A bit as wide as a float: a comparison then selects among them without
-    // leaving the vector.
+    // A bit as wide as a float, so that the comparison's result stays in vector registers.
     let bits: [u32; LANES] = lanes(|lane| u32::from(holds(lane)) << lane);
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
@@ -127,7 +126,7 @@ impl Isa for Plain {
     }
 }
 
-/// A list that knows how much was announced.
+/// A list with the room that was reserved for it.
 #[derive(Debug)]
 pub struct PlainPacker<'a> {
     out: &'a mut Vec<u32>,

@@ -7,8 +7,10 @@ use super::{AnyVolume, Predicate, QueryVolume, Recorder};
 use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, Sorted};
 use crate::kernel::Isa;
 
-/// Any volume of planes, with the verdicts and costs of the volume inside, bit for
-/// bit. Points are not among them: some structures search for a point differently.
+/// Any volume of planes, dispatched per test.
+///
+/// Verdicts and costs are those of the volume inside, bit for bit. Points are left out: some
+/// structures search for a point by a different traversal.
 pub(crate) struct Dispatched<'a>(pub AnyVolume<'a>);
 
 // Not inlined, or all volumes would be compiled into each structure again.
@@ -40,7 +42,7 @@ impl QueryVolume for Dispatched<'_> {
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         each_volume!(self.0, volume => volume.kept_lanes(isa, block, mask))
     }
-    /// Does nothing: an untimed query gains nothing by it.
+    /// Does nothing: prefetches gain nothing in an untimed query.
     fn prefetch(&self, _: &BoxBlock, _: PlaneMask) {}
     #[inline(never)]
     fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {

@@ -22,7 +22,7 @@ impl Located {
     #[inline(always)]
     pub fn push(&mut self, ids: &[ItemId]) {
         match ids {
-            // The usual case on a tiling, without a call to copy four bytes.
+            // The usual case on a tiling: no call to copy four bytes.
             [id] => self.ids.push(*id),
             _ => extend(&mut self.ids, ids),
         }
@@ -48,8 +48,7 @@ impl Located {
     ///
     /// In the order of [`query`](crate::index::RegionIndex::query).
     ///
-    /// # Panics
-    /// No such point was answered.
+    /// # Panics If `point` is not below [`Located::len`].
     pub fn of(&self, point: usize) -> &[ItemId] {
         let first = point.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.ids[first..self.ends[point]]

@@ -42,8 +42,9 @@ pub trait Predicate: Sized + Sync {
     /// Returns whether the whole box is on the inner side of the plane of that bit.
     fn contains(&self, plane: u32, bounds: &Aabb) -> bool;
 
-    /// Returns whether the plane of that bit drops an item; by default, if it excludes
-    /// the item's bounds.
+    /// Returns whether the plane of that bit drops an item.
+    ///
+    /// The default: if it excludes the item's bounds.
     #[inline(always)]
     fn drops(&self, plane: u32, item: &Aabb) -> bool {
         self.excludes(plane, item)
@@ -55,8 +56,9 @@ pub trait Predicate: Sized + Sync {
         mask.count_ones()
     }
 
-    /// The verdict about a node's bounds, which must not be empty, and the mask
-    /// for its children. Tests only the planes of `mask`.
+    /// Classifies a node's bounds; returns the mask for its children too.
+    ///
+    /// The bounds must not be empty. Tests only the planes of `mask`.
     #[inline(always)]
     fn classify<R: Recorder>(
         &self,
@@ -82,9 +84,10 @@ pub trait Predicate: Sized + Sync {
         (verdict, undecided)
     }
 
-    /// Returns whether an item below a node with this mask belongs to the answer. Half
-    /// the work of [`Predicate::classify`]: an item has no children, so containment is
-    /// not tested.
+    /// Returns whether an item below a node with this mask belongs to the answer.
+    ///
+    /// Half the work of [`Predicate::classify`]: an item has no children, so containment is not
+    /// tested.
     #[inline(always)]
     fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
         for plane in Bits(mask.into()) {
@@ -96,8 +99,7 @@ pub trait Predicate: Sized + Sync {
         true
     }
 
-    /// Returns whether an item belongs to the answer: no plane drops it, and it is not
-    /// empty. O(planes).
+    /// Returns whether an item is not empty and no plane drops it. O(planes).
     fn sees(&self, item: &Aabb) -> bool {
         !item.is_empty() && self.admits(item, self.mask(), &mut super::NoRecorder)
     }
@@ -113,7 +115,7 @@ impl Predicate for Vec3 {
     fn excludes(&self, _: u32, bounds: &Aabb) -> bool {
         !bounds.contains_point(*self)
     }
-    /// No box is so small that each one in it holds the point.
+    /// No box is small enough that every box within it must hold the point.
     #[inline(always)]
     fn contains(&self, _: u32, _: &Aabb) -> bool {
         false
@@ -125,7 +127,8 @@ impl Predicate for Vec3 {
 }
 
 /// Box search: the boxes that share a point with this one (closed bounds).
-/// None with an empty one.
+///
+/// An empty box shares no point with any other.
 impl Predicate for Aabb {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
@@ -177,8 +180,9 @@ impl Predicate for ConvexVolumeF64 {
 }
 
 /// The sphere test, on an index over [sphere cubes](crate::geometry::sphere_cube).
-/// Nodes get the plane test, items the plane test and the sphere test; monotone because
-/// both use the cube's corners: see [`Spheres`].
+///
+/// Nodes get the plane test, items the plane test and the sphere test. Monotone because both use
+/// the cube's corners: see [`Spheres`].
 impl Predicate for Spheres {
     plane_test!(self => self.planes(), bounds => bounds);
 
@@ -188,9 +192,10 @@ impl Predicate for Spheres {
     }
 }
 
-/// The plane test on boxes relative to the eye. Monotone because moving a box
-/// is ([`Aabb::relative_to`]): a box within another is moved to a box within
-/// the other one moved, and there the plane test is monotone.
+/// The plane test on boxes relative to the eye.
+///
+/// Monotone because [`Aabb::relative_to`] is: translation keeps a box within its container, and the
+/// plane test on the translated boxes is monotone.
 impl Predicate for RelativeVolume {
     plane_test!(self => self.planes(), bounds => &self.moved(bounds));
 }

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Counts the steps of a query.
 ///
-/// The calls of [`NoRecorder`] compile to nothing, and nothing is ever timed with counters
-/// on.
+/// The calls of [`NoRecorder`] compile to nothing; queries are never timed with counters on.
 pub trait Recorder {
     /// The bounds of nodes were classified.
     #[inline(always)]

@@ -12,8 +12,9 @@ pub trait Sink {
     /// Takes ids of answers, none of them twice in a query.
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()>;
 
-    /// Takes items by their positions in a structure that keeps them in the order
-    /// of `ids`: `accept(&ids[places])`, for sinks that do not need the ids.
+    /// Takes the items `ids[places]`, by their positions in a structure's order.
+    ///
+    /// Same as `accept(&ids[places])`, for sinks that do not need the ids.
     #[inline(always)]
     fn accept_range<I: Isa>(
         &mut self,
@@ -24,8 +25,9 @@ pub trait Sink {
         self.accept(&ids[places])
     }
 
-    /// Takes the items at the positions `start + lane` of all lanes that are set.
-    /// Lowest lane first; by default, run by run.
+    /// Takes the items at `start + lane` of all set lanes, lowest lane first.
+    ///
+    /// The default passes run by run.
     #[inline(always)]
     fn accept_lanes<I: Isa>(
         &mut self,
@@ -40,8 +42,9 @@ pub trait Sink {
         ControlFlow::Continue(())
     }
 
-    /// Takes the answers of many blocks of items, one block after the other; `ids` are
-    /// those of each block.
+    /// Takes the answers of many blocks of items, in the order of the blocks.
+    ///
+    /// `ids` has a row per block.
     #[inline(always)]
     fn accept_tested<I: Isa, T: Tests<I>>(
         &mut self,
@@ -57,7 +60,7 @@ pub trait Sink {
     }
 }
 
-/// Blocks of items that the sink has tested one by one.
+/// Blocks of items, tested one by one when the sink requests it.
 pub trait Tests<I: Isa> {
     /// True if most blocks are expected to hold no answer: their ids are not read.
     const SPARSE: bool;
@@ -68,7 +71,7 @@ pub trait Tests<I: Isa> {
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask);
 }
 
-/// The runs of lanes that are set, lowest first.
+/// The runs of set lanes, lowest first.
 #[inline(always)]
 pub fn runs(lanes: LaneMask) -> impl Iterator<Item = Range<usize>> {
     let mut left = u32::from(lanes);
@@ -95,7 +98,7 @@ impl Sink for Vec<ItemId> {
         ControlFlow::Continue(())
     }
 
-    /// Copies short runs without a call of memcpy, which would cost more.
+    /// Copies short runs inline: a call of memcpy would cost more.
     #[inline(always)]
     fn accept_range<I: Isa>(
         &mut self,
@@ -140,7 +143,7 @@ impl Sink for Vec<ItemId> {
     }
 }
 
-/// The loop that most of a query is spent in.
+/// The inner loop in which most of a query is spent.
 struct Gather<'a, T> {
     out: &'a mut Vec<ItemId>,
     ids: &'a [[ItemId; LANES]],

@@ -18,8 +18,9 @@ use crate::kernel::Isa;
 ///
 /// Bit for bit its [`Predicate`], sixteen boxes at a time.
 pub trait QueryVolume: Predicate {
-    /// True if the volume is a point, for structures that search for points by other
-    /// means than bounds: [`QueryVolume::as_point`].
+    /// True if the volume is a point: [`QueryVolume::as_point`] returns it.
+    ///
+    /// For structures that search for points by other means than bounds.
     const IS_POINT: bool = false;
 
     /// True if [`QueryVolume::as_spheres`] returns spheres.
@@ -37,9 +38,10 @@ pub trait QueryVolume: Predicate {
         None
     }
 
-    /// The lanes that no plane of the mask drops: bit for bit
-    /// [`Predicate::drops`], lane by lane. Lanes that hold no item may come out
-    /// either way.
+    /// The lanes that no plane of the mask drops.
+    ///
+    /// Bit for bit [`Predicate::drops`], lane by lane. Bits of lanes without an item are
+    /// unspecified.
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let kept = |lane: usize| self.admits(&block.get(lane), mask, &mut NoRecorder);
@@ -48,8 +50,7 @@ pub trait QueryVolume: Predicate {
         })
     }
 
-    /// [`QueryVolume::kept_lanes`] of a block with that index, whose spheres are in
-    /// `balls`.
+    /// [`QueryVolume::kept_lanes`] of a block with its index in `balls`, its spheres.
     #[inline(always)]
     fn kept_balls<I: Isa>(
         &self,
@@ -61,15 +62,17 @@ pub trait QueryVolume: Predicate {
         self.kept_lanes(isa, block, mask)
     }
 
-    /// The plane of that bit, prepared for many blocks:
-    /// [`QueryVolume::kept_lanes`] with this bit for a mask.
+    /// The plane of that bit, prepared for many blocks.
+    ///
+    /// [`QueryVolume::kept_lanes`] with only this bit in the mask.
     #[inline(always)]
     fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
         (self, 1 << plane)
     }
 
-    /// All planes, prepared for many blocks: [`QueryVolume::kept_lanes`] with
-    /// [`Predicate::mask`]. `None` if there are too many planes.
+    /// All planes, prepared for many blocks; `None` if there are too many.
+    ///
+    /// [`QueryVolume::kept_lanes`] with [`Predicate::mask`].
     #[inline(always)]
     fn all_planes<I: Isa>(&self, _: I) -> Option<impl Planes<I>> {
         Some((self, self.mask()))
@@ -83,7 +86,7 @@ pub trait QueryVolume: Predicate {
         blocks: &[BoxBlock; 4],
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
-        // No closure: it would be compiled apart, without the instruction set.
+        // No closure: it would be compiled separately, without the instruction set.
         let mut kept = [0; 4];
         for (i, block) in blocks.iter().enumerate() {
             kept[i] = self.kept_lanes(isa, block, mask);
@@ -97,9 +100,10 @@ pub trait QueryVolume: Predicate {
         block.prefetch();
     }
 
-    /// Sixteen nodes at once: the lanes that no plane of the mask excludes, and
-    /// for each of them the planes that do not contain it, bit for bit
-    /// [`Predicate::classify`]. Lanes that are excluded have any word.
+    /// Classifies sixteen nodes at once.
+    ///
+    /// Returns the lanes that no plane of the mask excludes, and per lane the planes that do not
+    /// contain it; bit for bit [`Predicate::classify`]. Words of excluded lanes are unspecified.
     #[inline(always)]
     fn sorted_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> Sorted<I> {
         let mut kept = 0;
@@ -112,8 +116,9 @@ pub trait QueryVolume: Predicate {
         (kept, isa.words(&open))
     }
 
-    /// The open planes side by side, where one box against all of them at once
-    /// is the whole test of nodes and of items; `None` where it is not.
+    /// The open planes side by side: tests one box against all of them at once.
+    ///
+    /// `None` unless that is the whole test of nodes and of items.
     #[inline(always)]
     fn rows(&self) -> Option<PlaneRows> {
         None
@@ -335,8 +340,10 @@ mod tests {
     use crate::kernel::Plain;
     use proptest::prelude::*;
 
-    /// Checks the contract of a volume: monotone plane by plane, lanes like the scalar
-    /// test, and verdicts about a node that fit all of its items.
+    /// Checks the contract of a volume.
+    ///
+    /// Monotone plane by plane, lanes like the scalar test, verdicts about a node that hold for its
+    /// items.
     fn check<V: QueryVolume>(view: &V, items: &[Aabb]) -> Result<(), TestCaseError> {
         let node = Aabb::union_of(items);
         let mask = view.mask();
@@ -409,7 +416,7 @@ mod tests {
             check(&items[0], &items)?;
             check(&Aabb::new(items[0].max, items[0].min), &items)?;
             let spheres = Spheres::new(&volume);
-            // Whatever the boxes are, and as they are meant.
+            // Any boxes, then the cubes that the volume is meant for.
             check(&spheres, &items)?;
             let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
             check(&spheres, &cubes)?;

@@ -1,8 +1,8 @@
-//! The structure `auto`: a tree or a scan, and how it is updated.
+//! The structure `auto`: a tree or a scan, and its kind of updates.
 //!
 //! The build counts the work of a few frusta that look from item to item. Updates are weighed by
-//! what has moved, by the queries between them and by the work that the refitted tree has come to.
-//! All are counts, so every run chooses the same, and no answer depends on the choice.
+//! moved items, by queries between updates, and by the counted work of the refitted tree. All are
+//! counts: every run chooses the same, and no answer depends on the choice.
 
 mod params;
 
@@ -29,20 +29,20 @@ const REFIT: usize = 1;
 const REBUILD: usize = 2;
 const PART: usize = 3;
 
-// Times in ns, measured on one processor (AVX-512). Only their ratios choose.
-/// A query, besides what it tests, by search.
+// Times in ns, measured on one processor (AVX-512). Choices depend only on their ratios.
+/// A query without its tests, by search.
 const QUERY_NS: [f64; 2] = [51.0, 51.0];
-/// A tested node, item, plane of an item, and an item passed with its subtree.
+/// A tested node, a tested item, a plane of an item, an item accepted untested.
 const TREE_NS: [f64; 4] = [1.5, 0.12, 0.15, 0.03];
-/// An item of a scan, in the nearest cache.
+/// An item of a scan that fits the nearest cache.
 const SCAN_NS: f64 = 0.5;
-/// Items that fit the nearest cache; then time grows with the cube root of n.
+/// Items that fit the nearest cache; beyond, time grows with the cube root of n.
 const NEAR: f64 = 65_536.0;
-/// An overwritten item, by search: a scan has them in the order of their ids.
+/// An overwritten item, by search; a scan keeps items in the order of their ids.
 const MOVE_NS: [f64; 2] = [4.0, 8.0];
-/// A refit, and a leaf whose bounds it fits.
+/// A refit, and each leaf whose bounds it recomputes.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
-/// The same of two trees, of a moved item that jumps.
+/// A refit of the two trees, per moved item that jumps.
 const PART_NS: f64 = 250.0;
 /// Time of a query of two trees / of one in a new tree, until it is counted.
 const TWO: f64 = 2.0;
@@ -51,39 +51,39 @@ const BUILD_NS: f64 = 45.0;
 
 /// Number of frusta whose work is counted.
 const VIEWS: usize = 8;
-/// Time of a counted query / time of a query.
+/// Time of a counted query / time of an uncounted one.
 const COUNTED: f64 = 8.0;
-/// Time of updates and queries / time of counting the work of the refitted tree.
+/// Time of updates and queries per time spent on counting the refitted tree's work.
 const RARELY: f64 = 16.0;
-/// Time that a new tree would have saved / time of its build: less may be chance.
+/// Time saved by a new tree / time of its build; less may be chance.
 const AGE: f64 = 4.0;
-/// Most that counts become rarer where a tree does not age.
+/// Most by which counts become rarer if a tree does not age.
 const MOST_PATIENCE: f64 = 16.0;
-/// Weighings in which a scan forgets most of a tree's age.
+/// Number of weighings after which a scan has mostly forgotten a tree's age.
 const FORGETS: f64 = 256.0;
-/// Updates that are weighed at once.
+/// Updates per weighing.
 const TOGETHER: u32 = 8;
-/// Items x updates that are weighed at once where there are few items.
+/// Items x updates per weighing, if there are few items.
 const FEW: u32 = 2048;
-/// Most queries that are counted between two weighings; then nothing is written.
+/// Most queries counted between two weighings; later ones write nothing.
 const MOST_ASKED: u32 = 256;
 
 /// A tree, or a scan, by counted work.
 #[derive(Default)]
 pub struct Auto {
     trees: Moving,
-    /// Answers in place of the trees, which are as they were before its first update.
+    /// Answers in place of the trees, which are stale from its first update on.
     scan: Option<Linear>,
-    /// A scan of the same boxes until the queries of a frame are known.
+    /// A scan of the same boxes, kept until the number of queries per frame is known.
     reserve: Option<Linear>,
-    /// Movers have a tree of their own.
+    /// True if movers have a separate tree.
     is_parted: bool,
     params: AutoParams,
     /// Index of the search after a build.
     built: usize,
     /// Modelled time of a query, ns, by search; infinite where that is unknown.
     costs: [f64; 2],
-    /// The same of the refitted tree and of two trees, and of each view in a new tree.
+    /// Likewise of the refitted tree and of two trees; then of each view in a new tree.
     aged: [f64; 2],
     fresh: [Option<f64>; VIEWS],
     /// The view that was counted last.
@@ -93,15 +93,15 @@ pub struct Auto {
     /// Updates since the last weighing, and items moved.
     weighing: u32,
     moved: f64,
-    /// Present kind of update, and the modelled time it has lost to the best, ns.
+    /// Current kind of update, and the modelled time it has lost to the best, ns.
     update: usize,
     regret: f64,
     /// Queries and modelled time since work was counted.
     since: [f64; 2],
-    /// Queries of the tree before that, and what a new one would have saved, ns.
+    /// Queries of the tree before that, and the time a new one would have saved, ns.
     answered: f64,
     saving: f64,
-    /// Grows with each count that finds no change.
+    /// Grows with each count that finds no change: counts become rarer.
     patience: f64,
     /// Updates by kind, and the modelled time of all of them by each kind, ns.
     updates: [u32; 4],
@@ -118,10 +118,10 @@ impl Auto {
             let mut present = from.filter_map(|&id| items.get(id as usize));
             Some(present.find(|b| !b.is_empty())?.centre())
         };
-        // Tree order is spread over space: half, a quarter, .. of the items between.
+        // Tree order follows space: half, a quarter, .. of the items lie between.
         let at = i * ids.len() / VIEWS;
         let (eye, end) = (centre(at)?, centre(at + (ids.len() >> (1 + i % 4)))?);
-        // By a power of two, so that no square of a length overflows.
+        // Scaled by a power of two, so that no squared length overflows.
         let scale = f32::from_bits((end - eye).abs().max_element().to_bits() & 0x7F80_0000);
         let forward = ((end - eye) / scale).try_normalize()?;
         let (right, up) = forward.any_orthonormal_pair();
@@ -151,9 +151,9 @@ impl Auto {
         Some(work)
     }
 
-    /// Modelled time of a query, ns, by some views beside those in a new tree.
+    /// Modelled time of a query, ns, from some views relative to a new tree.
     ///
-    /// The present age if there is none.
+    /// The current estimate if no view can be compared.
     fn age(&self, items: &[Aabb], views: Range<usize>) -> f64 {
         let both = views.filter_map(|i| Some([self.view_ns(items, i)?, self.fresh[i]?]));
         let [now, fresh] = both.fold([0.0; 2], |sum, both| [sum[0] + both[0], sum[1] + both[1]]);
@@ -163,7 +163,7 @@ impl Auto {
         }
     }
 
-    /// Counts the work of all views in a new tree; modelled time of a query, ns.
+    /// Counts the work of all views in a new tree; returns the mean modelled time, ns.
     fn count(&mut self, items: &[Aabb]) -> f64 {
         self.fresh = std::array::from_fn(|i| self.view_ns(items, i));
         let known = self.fresh.iter().flatten();
@@ -192,12 +192,12 @@ impl Auto {
         self.scan = self.built_scan(items);
     }
 
-    /// The scan of a new tree that is built as one.
+    /// The scan that replaces a new tree, if the build chose a scan.
     fn built_scan(&self, items: &[Aabb]) -> Option<Linear> {
         (self.built == SCAN && !self.is_parted).then(|| self.scan_of(items))?
     }
 
-    /// A scan that may be taken at the second update.
+    /// A scan that the second update may take.
     fn reserve_of(&self, items: &[Aabb]) -> Option<Linear> {
         let is_free = self.params.structure == Use::Auto && self.params.update == Update::Auto;
         (is_free && self.updates == [0; 4]).then(|| self.scan_of(items))?
@@ -212,7 +212,7 @@ impl Auto {
     fn rebuild(&mut self, items: &[Aabb]) -> bool {
         let (order, spheres) = (self.params.order, self.trees.still.balls.is_some());
         let input = Input::new(items).spheres(spheres);
-        // Two trees have other lanes for what comes.
+        // Two trees hold new items without reserved lanes.
         let input = input.come_and_go(self.update != PART);
         let Ok(trees) = Moving::resting(&input, &WideParams { order }) else {
             return false;
@@ -230,14 +230,14 @@ impl Auto {
         true
     }
 
-    /// Watches the age of other trees from now on.
+    /// Starts to track the age of new trees.
     fn start(&mut self) {
         (self.since, self.answered, self.saving) = ([0.0; 2], 0.0, 0.0);
         // The first count comes early.
         self.patience = 0.25;
     }
 
-    /// New bounds in a scan; the tree is stale from then on.
+    /// Writes new bounds into a scan; the tree is stale from then on.
     fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if self.scan.is_none() {
             self.scan = self.reserve.take();
@@ -253,7 +253,7 @@ impl Auto {
         is_held
     }
 
-    /// New bounds in the trees; false if they cannot take them over.
+    /// Writes new bounds into the trees; false if they cannot take them over.
     fn refit_held(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         match self.is_parted {
             true => self.trees.refit(items, moved),
@@ -264,7 +264,7 @@ impl Auto {
     fn refit_trees(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let scans = self.scan.is_some();
         let is_held = match scans {
-            // What has moved meanwhile is not known.
+            // The moves made in the meantime are not recorded: all items count as moved.
             true => {
                 let all: Vec<ItemId> = (0..items.len() as ItemId).collect();
                 !self.is_aged() && self.trees.still.overwrite(items, &all).is_some()
@@ -280,7 +280,7 @@ impl Auto {
         if !is_held || self.is_old(items) {
             let is_built = self.rebuild(items);
             if self.is_parted && !is_held {
-                // Too crowded, now and after the build.
+                // Too crowded, now and after a build.
                 self.aged[1] = f64::INFINITY;
             }
             return is_built;
@@ -289,15 +289,15 @@ impl Auto {
         true
     }
 
-    /// Returns whether queries take half as long again as those of a new tree.
+    /// Returns whether queries take more than 1.5 times as long as in a new tree.
     fn is_aged(&self) -> bool {
         self.aged[0] > 1.5 * self.costs[TREE]
     }
 
-    /// Returns whether a new tree pays; rarely counts the work, a view in an update.
+    /// Returns whether a new tree pays; counts the work rarely, one view per update.
     ///
-    /// It does if it costs less than its queries have saved against the present age. Of a tree
-    /// that is old at once, a new one saves nothing.
+    /// It pays if it would have saved [`AGE`] times the time of its build in the queries so far.
+    /// Ageing up to the first count is left out: a new tree would age as fast.
     fn is_old(&mut self, items: &[Aabb]) -> bool {
         let ([asked, spent], present) = (self.since, self.aged[usize::from(self.is_parted)]);
         if self.params.update != Update::Auto || spent < RARELY * self.patience * COUNTED * present
@@ -306,7 +306,7 @@ impl Auto {
         }
         self.turn = (self.turn + 1) % VIEWS;
         let aged = self.age(items, self.turn..self.turn + 1);
-        // Half of it later on, as views differ, unless it is much.
+        // Later changes count half, since views differ, unless the time has doubled.
         let is_less = self.answered > 0.0 && aged < 2.0 * present;
         let more = (aged - present) / if is_less { 2.0 } else { 1.0 };
         self.saving += more * self.answered;
@@ -320,17 +320,18 @@ impl Auto {
         self.saving > AGE * BUILD_NS * items.len() as f64
     }
 
-    /// Chooses the kind of updates: another one when the present one has lost what a
-    /// change costs, so that a few exceptions change nothing.
+    /// Chooses the kind of updates.
+    ///
+    /// Switches once the present kind has lost the cost of a switch: outliers change nothing.
     fn weigh(&mut self, items: &[Aabb]) {
         let before = self.updates.iter().sum::<u32>();
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
         let asked = f64::from(std::mem::take(self.asked.get_mut()));
-        // Queries before the first update are of no frame.
+        // Queries before the first update belong to no frame.
         let asked = if before == 0 { 1.0 } else { asked.max(updates) };
         let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
-        // About the number of leaves that hold them, if items move anywhere.
+        // Approximate number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
         let fit = REFIT_NS[1] * fitted;
         self.costs[SCAN] = self.scan_ns();
@@ -354,19 +355,18 @@ impl Auto {
             (_, Use::Moving) => PART,
             (Update::Refit, _) => REFIT.min(self.built),
             (_, Use::Wide) => REFIT,
-            // The queries of a frame are not known yet.
             _ if before == 0 => REFIT.min(self.built),
             _ => (0..4).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
         };
         let is_new = (best == PART) != self.is_parted || scans && best == REFIT && self.is_aged();
-        // A build, a scan for a tree or the other way round, or a tree that is left alone.
+        // A build; a switch between scan and tree; or a switch that keeps the tree.
         let change = match (is_new, best == OVERWRITE || scans) {
             (true, _) => BUILD_NS * all,
             (_, true) => MOVE_NS[TREE] * all + REFIT_NS[1] * leaves,
             _ => 2.0 * REFIT_NS[1] * leaves,
         };
         self.regret += costs[self.update] - costs[best];
-        // The second knows the queries of a frame.
+        // At the second update the number of queries per frame is known.
         if before < 2 || self.regret > change {
             (self.update, self.regret) = (best, 0.0);
         }
@@ -431,7 +431,7 @@ impl RegionIndex for Auto {
         let Some(scan) = &self.scan else {
             return self.trees.query(volume, cx);
         };
-        // Nothing has moved: the tree's root holds all items.
+        // Nothing has moved: the root of the tree bounds all items.
         if self.updates[OVERWRITE] == 0
             && let Some(flow) = self.trees.still.query_root(volume, &scan.ids, cx)
         {
@@ -440,10 +440,10 @@ impl RegionIndex for Auto {
         scan.query(volume, cx)
     }
 
-    /// O(moved), or a new build. Items may become or cease to be empty.
+    /// O(moved), or a rebuild. Items may become or cease to be empty.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if moved.is_empty() {
-            // Tables for the updates that follow.
+            // Prepares tables for the following updates.
             return match &mut self.scan {
                 Some(scan) => scan.refit(items, moved),
                 None => {

@@ -19,15 +19,16 @@ use crate::threads::{map, share};
 pub enum BlockOrder {
     /// Recursive halving at the median of the widest axis.
     ///
-    /// Always at a multiple of the block size of the halves.
+    /// Always at a multiple of the halves' block size.
     #[default]
     Median,
     /// Sorted along the Morton curve of the centres.
     Morton,
 }
 
-/// A centre, with its id in the bits of the fourth number: sixteen bytes, one
-/// register.
+/// A centre, with its id in the bits of the fourth component.
+///
+/// Sixteen bytes: one register.
 #[derive(Clone, Copy)]
 struct Point(Vec4);
 
@@ -63,16 +64,16 @@ pub fn block_ordered(
     ids
 }
 
-/// Points to be halved until they are single units; the unit is a power of
-/// sixteen.
+/// Points to be halved until they are single units of a power of sixteen.
 struct Group<'a> {
     points: &'a mut [Point],
     unit: usize,
 }
 
 impl<'a> Group<'a> {
-    /// Its two halves, each unit of the lower one below each of the higher
-    /// one on the widest axis; `None` for a single block.
+    /// Splits into two halves at a unit boundary; `None` for a single block.
+    ///
+    /// On the widest axis no point of the lower half lies above one of the higher half.
     #[inline(always)]
     fn halved(mut self) -> Option<[Group<'a>; 2]> {
         while self.points.len() <= self.unit && self.unit > LANES {
@@ -90,7 +91,7 @@ impl<'a> Group<'a> {
         Some([low, high].map(|points| Group { points, unit }))
     }
 
-    /// Halves it down to single blocks, one half after the other.
+    /// Halves it down to single blocks, depth first.
     fn put_in_order(self) {
         let mut open = vec![self];
         while let Some(group) = open.pop() {
@@ -114,8 +115,8 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
         points: &mut points,
         unit,
     }];
-    // The order within a group depends on that group alone, not on the thread that
-    // halves it. First, round by round, enough groups to keep all threads busy.
+    // The order within a group depends on that group alone, not on the thread that halves it.
+    // Rounds of halving come first, until there are enough groups to keep all threads busy.
     while threads > 1 && open.len() < 4 * threads {
         if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
             break;
@@ -129,7 +130,7 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     }
 }
 
-/// The order of finite numbers: one comparison where the caller uses only "less".
+/// The order of finite numbers; one comparison if the caller only uses "less".
 #[inline(always)]
 fn order(a: f32, b: f32) -> Ordering {
     if a < b {
@@ -142,7 +143,7 @@ fn order(a: f32, b: f32) -> Ordering {
 }
 
 fn widest_axis(points: &[Point]) -> usize {
-    // Four chains: one would wait for the last minimum at every point.
+    // Four independent chains: a single one would wait for the last minimum at every point.
     let (fours, rest) = points.as_chunks::<4>();
     let (mut low, mut high) = ([Vec4::INFINITY; 4], [Vec4::NEG_INFINITY; 4]);
     for four in fours {
@@ -162,27 +163,29 @@ fn widest_axis(points: &[Point]) -> usize {
     wider(wider(0, 1), 2)
 }
 
-/// Bits an axis of a Morton code.
+/// Bits per axis of a Morton code.
 const BITS: u32 = 16;
 
-/// Morton codes (Morton 1966, "A computer oriented geodetic data base") of the
-/// centres within their own bounds, 16 bits an axis.
+/// Orders ids by the Morton codes of their centres, 16 bits per axis.
+///
+/// Morton 1966, "A computer oriented geodetic data base". Codes are relative to the bounds of the
+/// centres.
 fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     let centre = |id: ItemId| items[id as usize].centre();
     let bounds = Aabb::of_points(ids.iter().map(|&id| centre(id)));
     let cells = (1u32 << BITS) as f32;
-    // In halves, so that the width of a scene of all numbers stays finite.
+    // Halved first, so that the width of a scene spanning all of f32 stays finite.
     let half = bounds.half_extent();
     let code = |id: ItemId| {
         let from = (centre(id) * 0.5 - bounds.min * 0.5) / half * cells;
-        // A width of zero gives NaN, which becomes zero, as does all below.
+        // A width of zero gives NaN, which becomes zero, as do negative values.
         let cell = from.to_array().map(|x| (x as u64).min((1 << BITS) - 1));
         spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
     };
     let keyed = ids.iter().map(|&id| ((code(id) >> LOW) as u32, id));
     let mut sorted = sorted_by_radix(keyed.collect());
-    // Cells of the upper bits with more than a block of items: crowded corners
-    // of a scene, none in most.
+    // Cells of the upper bits with more than a block of items: crowded parts of a scene, usually
+    // none.
     for cell in sorted.chunk_by_mut(|a, b| a.0 == b.0) {
         if cell.len() > LANES {
             cell.sort_by_cached_key(|&(_, id)| code(id));
@@ -196,9 +199,10 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
 /// Lower bits of a code that the radix sort ignores, so that an entry is 8 bytes.
 const LOW: u32 = 3 * BITS - u32::BITS;
 
-/// Sorts by code, equal ones in the order given: least significant digit
-/// first (Knuth, TAOCP 3, 5.2.5). O(n). Eight bits a digit: with more, the
-/// places that are written to no longer fit the first cache and its pages.
+/// Sorts by code, stably. O(n).
+///
+/// Least significant digit first (Knuth, TAOCP 3, 5.2.5), eight bits per digit: with more, the
+/// write positions exceed the first-level cache and TLB.
 fn sorted_by_radix(mut from: Vec<(u32, ItemId)>) -> Vec<(u32, ItemId)> {
     let mut starts = [[0; 256]; size_of::<u32>()];
     for (code, _) in &from {
@@ -225,7 +229,7 @@ fn sorted_by_radix(mut from: Vec<(u32, ItemId)>) -> Vec<(u32, ItemId)> {
     from
 }
 
-/// Two zero bits behind each of the low 16 bits.
+/// Inserts two zero bits after each of the low 16 bits.
 fn spread(x: u64) -> u64 {
     let x = (x | x << 16) & 0x0000_0000_ff00_00ff;
     let x = (x | x << 8) & 0x0000_00f0_0f00_f00f;
@@ -245,7 +249,7 @@ mod tests {
         }
     }
 
-    /// A grid, shuffled; and what no order can be made of.
+    /// A shuffled grid, and scenes that no order improves.
     fn scenes() -> [Vec<Aabb>; 4] {
         let at = |x: u32, y: u32, z: u32| {
             Aabb::around(Vec3::new(x as f32, y as f32, z as f32), Vec3::splat(0.4))
@@ -283,7 +287,7 @@ mod tests {
         for order in [BlockOrder::Median, BlockOrder::Morton] {
             let ids = block_ordered(items, (0..4096).collect(), order, 1);
             for block in [16, 256] {
-                // A perfect block of the grid is as many cells.
+                // A perfect block of the grid spans as many cells as it has items.
                 let worst = ids.chunks(block).map(size).fold(0.0, f32::max);
                 assert!(worst <= 1.01 * block as f32, "{order:?}: {worst}");
             }

@@ -54,9 +54,8 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
 
     /// [`LevelTraversal::sort_level`] for the level above the leaves.
     ///
-    /// Leaves wholly inside are collected in `whole` and passed to the sink afterwards, a
-    /// row of prefetched ids each. Run ends are unpredictable branches, so they are not
-    /// tested.
+    /// Leaves wholly inside are collected in `whole` and passed to the sink afterwards, one row of
+    /// prefetched ids each. Run ends are unpredictable branches, so they are not tested.
     #[inline(always)]
     pub fn sort_last_level(
         &mut self,
@@ -137,8 +136,9 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
         sink.accept_tested(isa, self.ids.rows(), tests)
     }
 
-    /// Sorts the lanes of a block: straddling ones go to the frontier `below`; returns
-    /// the lanes that are inside.
+    /// Sorts the lanes of a block; returns those that are inside.
+    ///
+    /// Straddling lanes go to the frontier `below`.
     #[inline(always)]
     fn sort_lanes(
         &mut self,
@@ -181,10 +181,10 @@ impl<V: QueryVolume, C: Context> LevelTraversal<'_, V, C> {
     }
 }
 
-/// Fewest leaves that are distributed over buckets.
+/// Fewest leaves for which buckets pay.
 const WORTH_BUCKETS: usize = 48;
 
-/// The planes of one leaf of a list after another.
+/// The open planes of each leaf of a list.
 trait LeafTest<I: Isa> {
     /// Planes of a leaf.
     type Planes: Planes<I>;
@@ -192,7 +192,7 @@ trait LeafTest<I: Isa> {
     /// The planes that the i-th leaf is tested with.
     fn planes(&self, i: usize) -> Self::Planes;
 
-    /// How many planes those count as; none if the leaf is wholly inside.
+    /// Number of these planes; `None` if the leaf is wholly inside.
     fn open(&self, i: usize) -> Option<u32>;
 }
 
@@ -258,7 +258,7 @@ impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R
     }
 }
 
-/// The same planes for all leaves, and how many they count as.
+/// The same planes for all leaves, and their number.
 struct SamePlanes<P>(P, Option<u32>);
 
 impl<I: Isa, P: Planes<I>> LeafTest<I> for SamePlanes<P> {
@@ -275,7 +275,7 @@ impl<I: Isa, P: Planes<I>> LeafTest<I> for SamePlanes<P> {
     }
 }
 
-/// Nothing to test: leaves are wholly inside.
+/// No planes: leaves are wholly inside.
 #[derive(Clone, Copy)]
 struct WhollyInside;
 

@@ -32,12 +32,12 @@ impl Level {
         levels
     }
 
-    /// Index behind its last block.
+    /// Index after its last block.
     pub fn end(&self) -> usize {
         self.first + self.blocks
     }
 
-    /// The lanes of a block that hold a box, of a level above the leaves.
+    /// The lanes of a block above the leaves that hold a box.
     #[inline(always)]
     pub fn lanes(&self, block: usize) -> LaneMask {
         if block + 1 < self.blocks {
@@ -65,7 +65,7 @@ pub struct Layer<'t> {
 impl Layer<'_> {
     /// Positions of the items below some lanes of a block, run by run.
     ///
-    /// There are `count` items in all.
+    /// There are `count` items in the tree.
     #[inline(always)]
     pub fn items_of(
         &self,

@@ -47,9 +47,9 @@ const MOST_LEVELS: usize = 8;
 
 /// An implicit tree of sixteen-fold blocks over items in tree order.
 ///
-/// Level 0 are the items themselves, sixteen a block; lane `l` of block `b` on
-/// level `k` bounds block `16 b + l` of level `k - 1`, and with it the items
-/// from `(16 b + l) 16^k` on. 25.6 bytes of blocks, 4 of id and 0.13 of lanes an item.
+/// Level 0 holds the items, sixteen per block. Lane `l` of block `b` on level `k` bounds block `16
+/// b + l` of level `k - 1`, and with it the items from `(16 b + l) 16^k` on. Per item: 25.6 bytes
+/// of blocks, 4 of id, 0.13 of lanes.
 #[derive(Default)]
 pub struct Wide {
     blocks: Vec<BoxBlock>,
@@ -81,10 +81,10 @@ thread_local! {
     static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
 
-/// Distance of prefetches while the leaves are filled, in blocks of items.
+/// Distance of prefetches while leaves are filled, in blocks of items.
 const FILL_AHEAD: usize = 2;
 
-/// Leaves that are filled in one go, by one thread: whole parents of parents.
+/// Leaves that one thread fills at a time: whole grandparents.
 const SHARED_BLOCKS: usize = LANES * LANES;
 
 /// Fills consecutive leaves, from leaf `first` on, with the boxes of their items.
@@ -102,12 +102,12 @@ fn fill(items: &[Aabb], ids: &[ItemId], first: usize, leaves: &mut [BoxBlock]) {
     }
 }
 
-/// Items, those absent in the box of the item before, and ids of the absent ones.
+/// Items, an absent one in the box of the item before, and ids of the absent.
 ///
-/// All as they are unless items [come and go](Input::come_and_go).
+/// Without [`Input::come_and_go`] items are unchanged.
 fn with_lanes<'a>(input: &Input<'a>) -> (Cow<'a, [Aabb]>, Vec<ItemId>) {
     let items = input.items;
-    // A bound that is no number is refused by the build.
+    // The build refuses bounds that are not numbers.
     let is_gone = |b: &Aabb| input.come_and_go && b.is_empty() && b.is_finite();
     let ids = (0..).zip(items).filter(|(_, b)| is_gone(b));
     let gone: Vec<ItemId> = ids.map(|(id, _)| id).collect();
@@ -201,12 +201,12 @@ impl Wide {
         }
     }
 
-    /// Passes every item that the volume sees to the sink: level by level, runs of
-    /// items that are wholly inside first, then the tested items of leaves.
+    /// Passes every item that the volume sees to the sink, level by level.
     ///
-    /// Each block is sorted into outside, inside and straddling children; straddling
-    /// ones go to the next level's frontier with their open planes. Level by level,
-    /// so that the next blocks are known and can be prefetched.
+    /// Runs of items wholly inside come first, then the tested items of leaves. Each block is
+    /// sorted into outside, inside and straddling children; straddling ones go to the next level's
+    /// frontier with their open planes. Level by level, the next blocks are known and can be
+    /// prefetched.
     #[inline(always)]
     fn search<Q: QueryVolume, C: Context>(
         &self,
@@ -248,10 +248,10 @@ impl Wide {
         traversal.test_leaves(&leaves, here, &mut scratch.buckets)
     }
 
-    /// The whole query where the bounds of all items decide it.
+    /// Answers a query that the bounds of all items decide.
     ///
-    /// It finds nothing or, without vacant lanes, everything, in the order of `ids`. `None` for
-    /// a query that counts its work, that of blocks.
+    /// Finds nothing or, without vacant lanes, everything, in the order of `ids`. `None` for a
+    /// query that counts its work, which is that of blocks.
     #[inline(always)]
     fn query_root<Q: QueryVolume, C: Context>(
         &self,
@@ -268,7 +268,7 @@ impl Wide {
         }
     }
 
-    /// Position of all items, by the planes up to the first that does not contain them.
+    /// Classifies the root by the planes up to the first that does not contain it.
     // Not inlined, so that the loops of a query keep their registers.
     #[inline(never)]
     fn root_verdict<Q: QueryVolume>(&self, volume: &Q) -> Containment {
@@ -286,14 +286,14 @@ impl Wide {
     fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        // Depth first: at most one lane of each level is left open on a tiling.
+        // Depth first: on a tiling at most one lane of each level stays open.
         let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
         let mut open = [(0, 0); MOST_LEVELS];
         let (mut level, mut block) = (top, 0);
         loop {
-            // In one place, to be compiled for the instruction set.
+            // One code path for all levels, inlined once and compiled for the instruction set.
             let lanes = if level == 0 {
                 recorder.items_tested(self.occupied[block].count_ones());
                 self.occupied[block]
@@ -321,7 +321,7 @@ impl Wide {
         }
     }
 
-    /// Adds the lanes of a block above the leaves, each before its block.
+    /// Adds a cell per lane of a block above the leaves, parents first.
     fn add_cells<'a>(&'a self, level: usize, block: usize, cells: &mut Vec<TreeCell<'a>>) {
         let Level { first, boxes, .. } = self.levels[level];
         if level == 0 {
@@ -354,7 +354,7 @@ impl RegionIndex for Wide {
     .threaded_build();
     type Params = WideParams;
 
-    /// O(n log n) by medians, O(n) but for the sort by Morton codes.
+    /// O(n log n) by medians; O(n) and a sort by Morton codes.
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let threads = input.threads();
         let (items, gone) = with_lanes(input);
@@ -399,14 +399,14 @@ impl RegionIndex for Wide {
         flow
     }
 
-    /// O(moved * depth). Items of the build may become empty and come back.
+    /// O(moved * depth). Items of the build may become empty and reappear.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.take_over(items, moved)
     }
 
     fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
-        // The slices of a cell cannot leave out vacant lanes.
+        // The slices of a cell cannot skip vacant lanes.
         if let Some(top) = self.levels.len().checked_sub(1)
             && self.vacant == 0
         {

@@ -1,11 +1,11 @@
-//! The structure `moving`: a tree of what rests beside a tree of what moves.
+//! The structure `moving`: a tree of resting items beside a tree of moving ones.
 //!
-//! The still tree is a [`Wide`]. An item that moves now and then is overwritten in its
-//! leaf there, or goes to a vacant lane of the leaf that is nearest: leaves keep the cells
-//! of space that they had at the build, their homes, and outgrow them by a margin at most.
-//! Items that move in update after update, and those that find no lane, are in a second
-//! [`Wide`], each leaf of which belongs to a region: some neighbouring homes, fewer where
-//! there are more movers. So bounds do not grow, however many updates come.
+//! The still tree is a [`Wide`]. An item that moves now and then is overwritten in its leaf there
+//! or goes to a vacant lane of the nearest leaf. Leaves keep the cells of space that they had at
+//! the build (their homes) and outgrow them by a bounded margin. Items that move in every update,
+//! and those that find no lane, are in a second [`Wide`], whose leaves belong to regions: groups of
+//! neighbouring homes, smaller where there are more movers. So bounds stay small over any number of
+//! updates.
 
 use std::collections::BTreeSet;
 use std::iter::repeat_n;
@@ -29,25 +29,25 @@ const MOVER: usize = 1 << 31;
 /// Updates without a move after which an item rests.
 const REST: u8 = 8;
 
-/// Updates that the movers of a leaf take to leave it: no update is much slower.
+/// Updates over which the movers of a leaf leave it, so that no update is slow.
 const LEAVING: u8 = 32;
 
-/// Most growth of a leaf of the still tree on a side, in longest edges of its home.
+/// Most growth of a leaf of the still tree per side, in longest edges of its home.
 const GROWTH: f32 = 0.25;
 
-/// The same of a region for the centres of its movers.
+/// Most growth of a region for the centres of its movers, likewise.
 const REGION_GROWTH: f32 = 0.125;
 
-/// Leaves of movers / those added when all are in use, which no update feels.
+/// Leaves of movers / leaves added when all are in use; the cost is not noticeable.
 const MORE: usize = 16;
 
 /// Leaves of movers from which on a region is crowded.
 const CROWDED: usize = 32;
 
-/// Most moved items per region before there are new regions.
+/// Most moved items per region before regions are divided again.
 const COARSE: usize = 256;
 
-/// Number of the first update, so that all items rest before it.
+/// Number of the first update, so that all items count as resting before it.
 const FIRST: u8 = 2 * REST;
 
 /// A tree of resting items and a tree of moving ones; items may come and go.
@@ -60,7 +60,7 @@ pub struct Moving {
     regions: Vec<Region>,
     /// Region of each leaf of `still`; at least one.
     region_of: Vec<u32>,
-    /// Smallest span of a region.
+    /// Smallest span of a region, in leaves.
     finest: usize,
     /// Leaves of `movers`.
     leaves: Vec<MoverLeaf>,
@@ -69,23 +69,23 @@ pub struct Moving {
     positions: Positions,
     /// Number of the last update that moved each item.
     moved: Vec<u8>,
-    /// Leaves of movers beyond [`CROWDED`] of their region.
+    /// Total of leaves of movers beyond [`CROWDED`] per region.
     crowded: usize,
-    /// Number of the update.
+    /// Number of the current update.
     now: u8,
-    /// The leaf of movers that is looked at next.
+    /// The leaf of movers that is checked next.
     next: usize,
     changed: Dirty,
     /// Leaves of `still` that items have left.
     left: Dirty,
 }
 
-/// Neighbouring leaves of the still tree.
+/// A range of neighbouring leaves of the still tree.
 ///
-/// Its movers fill leaf after leaf: a single one unless its span is the finest.
+/// Its movers fill leaf after leaf; just one leaf unless its span is the finest.
 #[derive(Clone, Copy)]
 struct Region {
-    /// Centres of movers that do not leave it.
+    /// Bounds of the centres of movers that stay in the region.
     cell: Aabb,
     /// Its first leaf in the still tree, a multiple of `span`.
     first: usize,
@@ -100,7 +100,7 @@ struct Region {
 #[derive(Clone, Copy, Default)]
 struct MoverLeaf {
     region: u32,
-    /// The leaf of this region that was filled before.
+    /// The leaf of this region that was filled before this one.
     before: u32,
 }
 
@@ -112,7 +112,7 @@ fn grown(b: Aabb, by: f32) -> Aabb {
 }
 
 impl Moving {
-    /// The still tree alone; the first update does the rest.
+    /// Builds the still tree alone; the first update prepares the rest.
     pub(super) fn resting(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
         let count = input.items.len();
         if count > MOST_ITEMS {
@@ -125,7 +125,7 @@ impl Moving {
         })
     }
 
-    /// Makes homes and regions, once, and room for as many items.
+    /// Prepares homes and regions, once, and positions for `items` items.
     fn prepare(&mut self, items: usize) {
         self.positions.prepare(self.still.ids.iter(), items);
         self.moved.resize(items.max(self.moved.len()), REST);
@@ -138,18 +138,17 @@ impl Moving {
         }
     }
 
-    /// Divides the still tree into regions for a number of movers, six to eleven each.
+    /// Divides the still tree into regions of six to eleven of `movers` movers each.
     ///
-    /// The leaves of movers are in the order of space, with room for 8 or 32 times as many
-    /// regions.
+    /// The leaves of movers are in spatial order, with room for 8 or 32 times as many regions.
     fn divide(&mut self, movers: usize) {
         let leaves = self.region_of.len();
         let span = (6 * leaves / movers.max(1)).max(1).next_power_of_two();
-        // In small trees empty leaves cost more than nearness gains.
+        // In small trees empty leaves cost more than spatial order gains.
         let parts = if leaves < 1024 { 8 } else { 32 };
         self.finest = (span / parts).max(1);
         let first_free = leaves.div_ceil(self.finest);
-        // Leaves that are added later are in the order of space only among themselves.
+        // Leaves added later are in spatial order only among themselves.
         let count = 2 * first_free + 1;
         let mut new = Wide::unfilled(&vec![ABSENT; count * LANES]);
         let balls = || BallBlocks::of(repeat_n(Aabb::EMPTY, count * LANES));
@@ -187,8 +186,9 @@ impl Moving {
         region
     }
 
-    /// Bounds at the build of some leaves of the still tree, whose number is a power of
-    /// two; all of space for the whole tree.
+    /// Bounds of `span` leaves of the still tree at the build.
+    ///
+    /// `span` is a power of two. All of space for the whole tree.
     #[inline(always)]
     fn home(&self, first: usize, span: usize) -> Aabb {
         if span >= self.region_of.len() {
@@ -265,8 +265,9 @@ impl Moving {
         grown(self.home(leaf, 1), GROWTH).contains(bounds)
     }
 
-    /// Puts an item into a leaf of the still tree, the nearest one or one beside it;
-    /// false if none that may hold it has a vacant lane.
+    /// Puts an item into the nearest leaf of the still tree, or one beside it.
+    ///
+    /// False if no leaf that may hold the item has a vacant lane.
     fn rest(&mut self, near: usize, id: ItemId, bounds: &Aabb) -> bool {
         let first = near - near % LANES;
         let beside = first..self.region_of.len().min(first + LANES);
@@ -297,7 +298,7 @@ impl Moving {
         self.append(region, id, bounds);
     }
 
-    /// Adds a mover behind the last one of a region.
+    /// Adds a mover after the last one of a region.
     fn append(&mut self, region: usize, id: ItemId, bounds: &Aabb) {
         let movers = self.regions[region].movers;
         if movers > 0 && movers.is_multiple_of(LANES) {
@@ -312,7 +313,7 @@ impl Moving {
         self.put(at, id, bounds);
     }
 
-    /// Halves a region of a single leaf of movers.
+    /// Halves a region that has a single leaf of movers.
     fn split(&mut self, region: usize) {
         let own = self.regions[region];
         let (first, last, half) = (own.first, own.last, own.span / 2);
@@ -322,7 +323,7 @@ impl Moving {
             return;
         }
         let upper = self.add_region(first + half, half);
-        // Backwards, as the last mover takes the place of a removed one.
+        // Backwards, because the last mover takes the place of a removed one.
         for at in (last * LANES..(last + 1) * LANES).rev() {
             let bounds = self.movers.blocks[last].get(at % LANES);
             if self.region_of[self.leaf_for(&bounds)] as usize == upper {
@@ -359,9 +360,9 @@ impl Moving {
         self.changed.mark(position / LANES);
     }
 
-    /// A leaf of movers that no region begins with; more of them if all are in use.
+    /// A free leaf of movers; adds leaves if all are in use.
     ///
-    /// These are in the order of space too, so that those of a region are neighbours.
+    /// Leaves that are added are in spatial order too, so that those of a region are neighbours.
     fn free_leaf(&mut self, region: usize) -> usize {
         if self.free_leaves.is_empty() {
             let count = self.leaves.len();
@@ -412,7 +413,7 @@ impl RegionIndex for Moving {
 
     /// O(n log n), that of [`Wide`].
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
-        // Vacant lanes and a second tree take what comes.
+        // Vacant lanes are not needed: the second tree takes items that appear.
         let mut trees = Moving::resting(&input.come_and_go(false), params)?;
         trees.prepare(input.items.len());
         Ok(trees)
@@ -445,8 +446,9 @@ impl RegionIndex for Moving {
         ControlFlow::Continue(())
     }
 
-    /// O(moved). Items may become or cease to be empty. A rebuild is needed where most
-    /// items have gathered in a few places.
+    /// O(moved). Items may become or cease to be empty.
+    ///
+    /// A rebuild is needed if most items have gathered in a few places.
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         if self.crowded * LANES > items.len() / 8 || items.len() > MOST_ITEMS {
             return false;

@@ -7,7 +7,7 @@ use crate::index::items::{ABSENT, Dirty};
 use crate::query::ItemId;
 
 impl Wide {
-    /// [`RegionIndex::refit`](crate::index::RegionIndex::refit).
+    /// [`RegionIndex::refit`](crate::index::RegionIndex::refit) of the wide tree.
     ///
     /// False with nothing changed if an item has no lane.
     pub(super) fn take_over(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -15,7 +15,7 @@ impl Wide {
         changed.map(|leaves| self.fit_above(leaves)).is_some()
     }
 
-    /// The leaves alone; returns those that have changed.
+    /// Overwrites the leaves alone; returns those that have changed.
     pub(super) fn overwrite(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<Dirty> {
         self.positions.prepare(self.ids.iter(), items.len());
         let enters =
@@ -44,19 +44,19 @@ impl Wide {
         Some(leaves)
     }
 
-    /// Fits all blocks above the leaves.
+    /// Recomputes all blocks above the leaves.
     pub(super) fn fit(&mut self) {
         let mut leaves = self.untouched();
         (0..self.occupied.len()).for_each(|leaf| _ = leaves.mark(leaf));
         self.fit_above(leaves);
     }
 
-    /// No leaf, for [`Wide::fit_above`].
+    /// No changed leaf, for [`Wide::fit_above`].
     pub(super) fn untouched(&self) -> Dirty {
         Dirty::none(self.occupied.len())
     }
 
-    /// Appends vacant leaves, in place as far as there is room.
+    /// Appends vacant leaves, in place if there is room.
     pub(super) fn lengthen(&mut self, leaves: usize) {
         let (held, top) = (self.ids.len(), self.top());
         (held..leaves * LANES).for_each(|_| self.ids.push(ABSENT));
@@ -68,7 +68,7 @@ impl Wide {
         let before = std::mem::replace(&mut self.levels, Level::over(self.ids.len()));
         let blocks = self.levels.last().map_or(0, Level::end);
         self.blocks.resize(blocks, BoxBlock::EMPTY);
-        // The highest first: each moves on over those above it.
+        // Highest first: each level moves towards the end, over those above it.
         for (k, level) in self.levels.iter().enumerate().rev() {
             let mut end = level.first;
             if let Some(old) = before.get(k) {
@@ -82,7 +82,7 @@ impl Wide {
         }
     }
 
-    /// Sets the item of a lane; no item with the id [`ABSENT`].
+    /// Sets the item of a lane; the id [`ABSENT`] vacates the lane.
     pub(super) fn put(&mut self, position: usize, id: ItemId, bounds: &Aabb) {
         let before = self.ids[position];
         self.vacant = self.vacant + usize::from(id == ABSENT) - usize::from(before == ABSENT);
@@ -116,7 +116,7 @@ impl Wide {
         self.root = self.root.union(bounds);
     }
 
-    /// Fits the blocks above some leaves to the boxes of these leaves.
+    /// Recomputes the blocks above the changed leaves.
     pub(super) fn fit_above(&mut self, mut changed: Dirty) {
         for pair in self.levels.windows(2) {
             let (here, above) = (pair[0], pair[1]);
@@ -201,7 +201,7 @@ mod tests {
                 }
                 assert!(tree.refit(&items, &moved));
                 assert!(spheres.refit(&items, &moved));
-                // Spheres that were far once are forgotten.
+                // Spheres that were far once no longer count.
                 let reach = tree.root.reach().max_element();
                 assert_eq!(spheres.balls.as_ref().unwrap().reach, reach);
                 let held = indexable(&items).unwrap();

@@ -1,21 +1,21 @@
-//! The nodes of a frontier in buckets, by the plane that alone is open.
+//! The nodes of a frontier in buckets by their only open plane.
 //!
-//! One bucket for each plane that is the only open one of its nodes, and one for the rest. So a
-//! plane's coefficients are prepared once for all of its nodes, without unpredictable branches
-//! between them.
+//! One bucket for each plane, and one for nodes with several open planes. So a plane's coefficients
+//! are prepared once for all of its nodes, without unpredictable branches between them.
 
 use crate::geometry::LANES;
 use crate::index::frontier::{Frontier, NodeList};
 use crate::kernel::Isa;
 
-/// Planes with a bucket, the lowest ones: those of a frustum. Nodes with other
-/// open planes stay with the rest.
+/// Number of planes with a bucket, the lowest ones: those of a frustum.
+///
+/// Nodes whose only open plane is another one stay in `rest`.
 const BUCKETS: usize = 6;
 
 /// The buckets, kept between queries.
 #[derive(Default)]
 pub struct SinglePlaneBuckets {
-    /// The nodes whose only open plane is that one.
+    /// The nodes whose only open plane is that of the index.
     pub buckets: [NodeList; BUCKETS],
     /// Nodes with several open planes, or one without a bucket.
     pub rest: Frontier,

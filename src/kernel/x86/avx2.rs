@@ -20,9 +20,9 @@ type Words = [__m256i; 2];
 
 /// Elementwise operations on two vectors, written out.
 ///
-/// `array::from_fn` and `map`, and closures that are called twice, are functions of their
-/// own, which a build without link-time optimisation leaves outside the kernel, compiled
-/// without its instructions (seen: a scan 65 times slower).
+/// `array::from_fn`, `map` and closures called twice become functions. A build without link-time
+/// optimisation leaves those outside the kernel, compiled without its instructions (seen: a scan 65
+/// times slower).
 macro_rules! each {
     (|$i:ident| $op:expr) => {
         [
@@ -152,12 +152,12 @@ impl Isa for Avx2 {
     }
 }
 
-// SAFETY: as many words as there are lanes are written, and never more than a row.
+// SAFETY: one word per lane is written, never more than a row.
 unsafe impl PackTo for Avx2 {
     #[inline(always)]
     unsafe fn pack_to(self, place: *mut u32, words: Words, lanes: LaneMask) {
-        // The first store is whole, and what it leaves behind its lanes the
-        // second one covers; together they stay within sixteen places.
+        // Each store is a whole vector: the second one overwrites what the first left behind its
+        // lanes. Together they stay within sixteen places.
         let (low, high) = (lanes & 0xff, lanes >> 8);
         unsafe {
             _mm256_storeu_si256(place.cast(), packed_256(words[0], low));
@@ -177,8 +177,8 @@ fn signs_256(x: Floats) -> LaneMask {
 #[inline(always)]
 fn packed_256(words: __m256i, lanes: LaneMask) -> __m256i {
     unsafe {
-        // A byte for each lane, those that count moved together, and widened
-        // to the indices of a permutation.
+        // A byte per lane, those of `lanes` moved together, and widened to the indices of a
+        // permutation.
         let bytes = _pdep_u64(u64::from(lanes), 0x0101_0101_0101_0101).wrapping_mul(0xff);
         let order = _pext_u64(0x0706_0504_0302_0100, bytes);
         let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order as i64));

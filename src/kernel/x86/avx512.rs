@@ -125,12 +125,12 @@ impl Isa for Avx512 {
     }
 }
 
-// SAFETY: as many words as there are lanes are written, and never more than a row.
+// SAFETY: one word per lane is written, never more than a row.
 unsafe impl PackTo for Avx512 {
     #[inline(always)]
     unsafe fn pack_to(self, place: *mut u32, words: __m512i, lanes: LaneMask) {
-        // Packed in a register and stored whole: a masked store is slower, on
-        // some processors very much so.
+        // Compressed in a register and stored whole: a masked store is slower, far slower on some
+        // processors.
         unsafe {
             let packed = _mm512_maskz_compress_epi32(lanes, words);
             _mm512_storeu_si512(place.cast(), packed);

@@ -36,7 +36,7 @@ pub use packer::{extend, extend_from_range};
 
 use super::{Kernel, Plain, Work};
 
-/// Returns whether this processor (and operating system) runs the kernel.
+/// Returns whether this processor and operating system run the kernel.
 pub fn detect(kernel: Kernel) -> bool {
     macro_rules! all {
         ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
@@ -52,8 +52,8 @@ pub fn detect(kernel: Kernel) -> bool {
 
 /// Does the work with this instruction set.
 ///
-/// With the portable one where the processor lacks it.
-// A call would store the work word by word and load it by vectors, which stalls.
+/// With the portable one if the processor lacks it.
+// Inlined: a call would store the work word by word and load it by vectors, which stalls.
 #[inline(always)]
 pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {
     match kernel {

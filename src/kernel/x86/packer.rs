@@ -6,11 +6,10 @@ use std::ops::Range;
 
 use crate::kernel::isa::{Isa, LANES, LaneMask, Pack};
 
-/// Instructions that pack words to memory that may not have been written yet.
+/// Instructions that compress words into memory that may be uninitialised.
 ///
-/// # Safety
-/// [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the
-/// sixteenth place.
+/// # Safety [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the sixteenth
+/// place.
 pub unsafe trait PackTo: Isa {
     /// Moves the words of `lanes` together, lowest first, to `place`.
     ///
@@ -45,9 +44,9 @@ pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
 /// Most words that are copied row by row.
 const FEW: usize = 16 * LANES;
 
-/// `extend(out, &words[places])`, row by row where there are few.
+/// `extend(out, &words[places])`, row by row for few words.
 ///
-/// A call of memcpy costs more than they do. The words behind them are read too.
+/// A call of memcpy would cost more. The rest of the last row is read too.
 #[inline(always)]
 pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
     let few = &words[places.clone()];

@@ -1,4 +1,4 @@
-//! Parameters of `auto`: what is forced.
+//! Parameters of `auto`: choices to fix.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::index::BlockOrder;
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoParams {
-    /// The structure to be: `linear`, `wide` or `moving`; `auto` for the cheapest.
+    /// The structure: `linear`, `wide` or `moving`; `auto` for the cheapest.
     #[serde(rename = "use")]
     pub structure: Use,
     /// Updates by `refit` or `rebuild`; `auto` for the cheapest.
@@ -17,22 +17,22 @@ pub struct AutoParams {
     pub order: BlockOrder,
 }
 
-/// Structure that [`Auto`] is to be.
+/// Structure that [`Auto`] uses.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Use {
-    /// The cheapest of a scan and a tree.
+    /// The cheaper of a scan and a tree.
     #[default]
     Auto,
     /// A scan of all items.
     Linear,
     /// A tree.
     Wide,
-    /// A tree of what rests beside a tree of what moves.
+    /// A tree of resting items beside a tree of moving ones.
     Moving,
 }
 
-/// Work of [`Auto`] after items have moved.
+/// Updates of [`Auto`] after items have moved.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Update {

@@ -1,4 +1,4 @@
-//! Answers, forced choices, and choices by what moves, is queried and has aged.
+//! Answers, fixed choices, and choices by motion, queries and age of the tree.
 
 use super::*;
 use crate::index::{FrustumQuery, StructureSpec};
@@ -71,7 +71,7 @@ fn answers_are_those_of_a_scan_whatever_is_chosen_and_moves() {
             let mut rng = Pcg64::seed_from_u64(seed as u64);
             for count in [0, 1, 17, 300, 5000] {
                 let mut items = cubes(&mut rng, count + 40);
-                // Some are there only later.
+                // The rest appear later.
                 items[count..].fill(GONE);
                 let told = format!(":use={structure},update={update}");
                 let mut index = built(&items, &told);
@@ -79,7 +79,7 @@ fn answers_are_those_of_a_scan_whatever_is_chosen_and_moves() {
                     let share = [300, 1, 40, 1, 300][round as usize / 4];
                     let some = |_| rng.next_u32() % items.len() as u32;
                     let moved: Vec<ItemId> = (0..items.len() / share).map(some).collect();
-                    // Only half of the rounds have items that come and go.
+                    // Only in half of the rounds do items come and go.
                     let fates = if round % 4 < 2 { 8 } else { 1 };
                     for &id in &moved {
                         let b = &mut items[id as usize];
@@ -108,7 +108,7 @@ fn answers_are_right_through_every_change_of_kind() {
     let others = [REFIT, PART, OVERWRITE, OVERWRITE, REBUILD, OVERWRITE];
     for (round, kind) in some.into_iter().chain(others).enumerate() {
         (index.update, index.weighing) = (kind, 0);
-        // Some twice, in no order; a quarter leaves or stays away.
+        // Some twice, in no order; a quarter disappears or stays away.
         let some = |_| rng.next_u32() % items.len() as u32;
         let moved: Vec<ItemId> = (0..300).map(some).collect();
         for &id in &moved {
@@ -182,7 +182,7 @@ fn a_world_is_searched_by_its_tree_and_a_heap_as_a_whole() {
     let mut rng = Pcg64::seed_from_u64(7);
     let built = |items: &[Aabb]| SEARCHES[built(items, "").built];
     assert_eq!(built(&cubes(&mut rng, 30_000)), "tree");
-    // Each box reaches through the whole world.
+    // Each box spans the whole world.
     let heap = |_| Aabb::around(0.1 * point(&mut rng), Vec3::splat(90.0));
     let heap: Vec<Aabb> = (0..30_000).map(heap).collect();
     assert_eq!(built(&heap), "scan of all items");
@@ -296,9 +296,9 @@ fn items_that_come_and_go_have_a_lane_after_each_build() {
         assert!(index.refit(&items, &moved));
         assert_right(&index, &items, &mut rng, "come and gone");
     }
-    // The first build has lanes for those of its items alone.
+    // The first build has lanes only for the items present then.
     assert_eq!(index.updates, [0, 59, 2, 0]);
-    // No frustum begins at an item that is gone.
+    // No frustum starts at an item that is gone.
     let last = items.len() - 1;
     items[..last].fill(GONE);
     assert_eq!(views(&index, &items).len(), 0);
@@ -335,7 +335,7 @@ fn few_items_are_scanned_and_many_searched() {
     }
 }
 
-/// The scan in reserve is taken by the second update, or left.
+/// The second update takes the scan in reserve or drops it.
 #[test]
 fn a_scan_in_reserve_answers_from_the_second_update_on() {
     let rng = &mut Pcg64::seed_from_u64(17);

@@ -70,7 +70,7 @@ fn assert_right(index: &Moving, items: &[Aabb], rng: &mut Pcg64) {
     assert_eq!(movers, count_of_movers(index));
     let is_divided = |r: &Region| r.span == index.finest || r.movers <= LANES;
     assert!(index.regions.iter().all(is_divided));
-    // Leaves of the still tree do not outgrow their homes, whatever moves.
+    // Leaves of the still tree never outgrow their homes beyond the margin.
     for leaf in 0..index.still.levels.first().map_or(0, |level| level.blocks) {
         let first = leaf * LANES;
         for (at, _) in (first..).zip(index.still.ids[first..].iter().take(LANES)) {
@@ -85,7 +85,7 @@ fn answers_are_those_of_a_scan_whatever_moves_comes_and_goes() {
     let mut rng = Pcg64::seed_from_u64(7);
     for count in [0, 1, 20, 300, 3000] {
         let mut items = cubes(&mut rng, count + 40);
-        // Some are there only later.
+        // The rest appear later.
         items[count..].fill(GONE);
         let mut index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
         for round in 0..60u32 {
@@ -123,7 +123,7 @@ fn movers_that_rest_return_to_the_still_tree() {
     }
     assert_eq!(count_of_movers(&index), 5000);
     assert_right(&index, &items, &mut rng);
-    // More updates than `now` counts.
+    // More updates than `now` can count.
     for _ in 0..900 {
         assert!(index.refit(&items, &[17]));
     }
@@ -144,7 +144,7 @@ fn an_item_that_moves_now_and_then_stays_in_the_still_tree() {
         }
         assert!(index.refit(&items, &moved));
     }
-    // Each has gone to six random places.
+    // Each has been at six random positions.
     let movers = count_of_movers(&index);
     assert!(movers < 800, "{movers} movers");
     assert_right(&index, &items, &mut rng);
