@@ -1,7 +1,7 @@
-//! The BSP tree: planes divide the items, and points descend by them alone.
+//! The BSP tree: planes divide the items, and points descend by the planes alone.
 //!
-//! Includes the import of a map's own tree, whose planes have any orientation;
-//! `bsp_split_planes` has the choice of planes.
+//! Can import a map's own tree, whose planes have any orientation. `bsp_split_planes` chooses
+//! planes.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -14,14 +14,12 @@ use crate::index::{BuildError, Info, Input, Kind, check_range};
 
 /// A binary space partition with fitted node bounds.
 ///
-/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree
-/// structures".
+/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree structures".
 ///
-/// An item that a plane cuts is neither split nor stored twice: it goes to the
-/// side of its centre, and the node keeps how far each side reaches across the
-/// plane (two offsets, as in a bounding interval hierarchy, Waechter and Keller
-/// 2006, but for planes of any direction). A point takes both sides where the
-/// sides overlap.
+/// An item cut by a plane is neither split nor stored twice: it goes to the side of its centre, and
+/// the node keeps how far each side reaches across the plane (two offsets, as in a bounding
+/// interval hierarchy, Waechter and Keller 2006, but for planes of any direction). A point visits
+/// both sides where they overlap.
 pub type Bsp = Tree<BspBuilder>;
 
 /// Builder of [`Bsp`].
@@ -41,7 +39,7 @@ pub enum PlaneSource {
     Median,
     /// The map's own tree (a Doom WAD has one).
     ///
-    /// Items that its branches leave together are divided by `sah`.
+    /// Groups that its planes do not divide further are divided by `sah`.
     Import,
 }
 
@@ -58,7 +56,7 @@ defaults! {
 }
 
 impl BspParams {
-    /// The builder in effect, with the scene's own tree if it uses that.
+    /// The builder in effect, with the scene's own tree if the builder uses it.
     fn chosen<'a>(
         &self,
         own_tree: Option<&'a PlaneTree>,
@@ -100,7 +98,7 @@ impl Splitter for PlaneSplitter<'_> {
         parts: &mut Vec<Part<ImportedNode>>,
     ) {
         let count = records.len();
-        // Skips imported planes with everything on one side.
+        // Skips imported planes with all items on one side.
         let imported = loop {
             let Some(imported) = at.and_then(|at| self.imported?.nodes.get(at as usize)) else {
                 break None;
@@ -133,7 +131,7 @@ impl Splitter for PlaneSplitter<'_> {
         parts.extend(halves.map(|(items, cell)| Part { items, cell }));
     }
 
-    /// Continues as if the leaf were divided, for those that draw in tree order.
+    /// Continues as if the leaf were divided, for callers that draw in tree order.
     fn arrange(&mut self, records: &mut [Record]) {
         if self.source != PlaneSource::Median || records.len() <= ARRANGED {
             return;

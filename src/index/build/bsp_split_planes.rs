@@ -10,7 +10,7 @@ use crate::index::items::Record;
 
 /// Moves the records of the back to the front of the slice; returns their number.
 ///
-/// In any order. O(n).
+/// Their order is unspecified. O(n).
 pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usize {
     let mut back = 0;
     for i in 0..records.len() {
@@ -22,7 +22,7 @@ pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usiz
     back
 }
 
-/// Most items of a leaf that stay in any order: a block of them.
+/// Most items of a leaf whose order is left unspecified: one block.
 pub const ARRANGED: usize = LANES;
 
 fn centres(records: &[Record]) -> Aabb {
@@ -31,10 +31,10 @@ fn centres(records: &[Record]) -> Aabb {
 
 /// The median along the widest axis, or a plane beside it between two layers.
 ///
-/// Beside it where it would separate items of one centre: regions that tile space lie in
-/// layers, and a plane between two layers cuts none of them. Axis after axis, widest first;
-/// a side gets at least a quarter of the items (of few, at least one), or else the layer is
-/// divided after all.
+/// Beside it if the median would separate items with one centre: regions that tile space lie in
+/// layers, and a plane between two layers cuts none of them. Axes are tried widest first. A side
+/// gets at least a quarter of the items (at least one, if there are few); if no axis allows that,
+/// the median divides the layer.
 pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let centres = centres(records);
     let width = centres.half_extent();
@@ -42,13 +42,13 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
     let quarter = count.div_ceil(4);
-    // Few items may be divided unevenly: at most fifteen levels below.
+    // Few items may be divided unevenly: at most fifteen more levels.
     let sizes: &[usize] = match count <= ARRANGED {
         true => &[quarter, 1],
         false => &[quarter],
     };
     for &least in sizes {
-        // No plane across an axis separates centres with one coordinate on it.
+        // No plane perpendicular to an axis separates centres that are equal on it.
         let differ = |k: &usize| centres.min[*k] < centres.max[*k];
         for axis in axes.into_iter().filter(differ) {
             let at = |r: &Record| r.bounds.centre()[axis];
@@ -59,7 +59,7 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
             let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
             let is_below = half - below <= above - half;
             let nearest = if is_below { below } else { above };
-            // The other edge of the layer may be that of the group.
+            // The other edge of the layer may be the edge of the group.
             let nearest = match nearest {
                 0 => above,
                 all if all == count => below,
@@ -74,7 +74,7 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
             }
         }
     }
-    // The two zeros are equal.
+    // Adding 0.0 makes the two zeros equal.
     let at = |r: &Record| r.bounds.centre()[axes[0]] + 0.0;
     records.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
     (Vec3::AXES[axes[0]], half)
@@ -83,14 +83,14 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
 /// Bins per axis of the surface area heuristic.
 const BINS: usize = 16;
 
-/// The best of 15 planes on each axis by area times count, both sides.
+/// The best of 15 planes per axis, by the sum of area times count of both sides.
 ///
 /// `None` if all centres coincide.
 pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
     let centres = centres(records);
     let low = centres.min;
     let width = centres.max - low;
-    // Beyond f32's range, or no width at all: bins would be NaN.
+    // Width beyond f32's range, or zero: bins would be NaN.
     let scale = Vec3::splat(BINS as f32 * 0.999) / width;
     let is_usable = |k: &usize| scale[*k].is_finite() && scale[*k] > 0.0;
     let usable: Vec<usize> = (0..3).filter(is_usable).collect();
@@ -105,7 +105,7 @@ pub fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
             *count += 1;
         }
     }
-    // An empty box has no area; those of far items are numbers in f64 alone.
+    // An empty box has no area; areas of far items are finite only in f64.
     let cost = |(bounds, count): (Aabb, usize)| {
         let e = bounds.extent().as_dvec3().max(DVec3::ZERO);
         (e.x * e.y + e.y * e.z + e.z * e.x) * count as f64

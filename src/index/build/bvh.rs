@@ -39,7 +39,7 @@ defaults! {
 
 /// Cost of a node / cost of an item, by which obvhs merges leaves.
 ///
-/// Items are tested sixteen at a time, so fuller leaves pay than by obvhs's default, 3.
+/// Items are tested sixteen at a time, so fuller leaves pay than with obvhs's default, 3.
 const COLLAPSE_COST: f32 = 30.0;
 
 /// The presets of obvhs by their own names.
@@ -75,19 +75,20 @@ impl BvhPreset {
 
 /// Items grouped by equal bounds: a stack holds all items of one box.
 ///
-/// Clustering by nearest neighbour finds no nearest one among equal boxes, so obvhs gets
-/// one box per stack, and the items of the stack share its leaf.
+/// Clustering finds no nearest neighbour among equal boxes, so obvhs gets one box per stack, and
+/// the items of the stack share its leaf.
 struct Stacks {
     /// Item ids, stack by stack.
     members: Vec<ItemId>,
     /// First member of each stack, and the end of the last one.
     ///
-    /// Empty if every item is a stack of its own.
+    /// Empty if each item has a stack to itself.
     starts: Vec<u32>,
 }
 
-/// Size of the sample that decides whether there are stacks at all. Stacks that it
-/// misses are small, and so is their cost.
+/// Size of the sample that decides whether items are grouped into stacks.
+///
+/// Stacks that the sample misses are small, and so is their cost.
 const STACK_SAMPLE: usize = 4096;
 
 impl Stacks {
@@ -116,8 +117,10 @@ impl Stacks {
         }
     }
 
-    /// The boxes that obvhs builds over, one per stack: the items themselves where
-    /// they can be used as they are, so that ten million of them are not copied.
+    /// The boxes that obvhs builds over, one per stack.
+    ///
+    /// The items themselves if they can be used unchanged, so that ten million of them are not
+    /// copied.
     fn boxes<'a>(&self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
         let scale = Aabb::union_of(items).scale_for_areas();
         if scale == 1.0 && self.starts.is_empty() && self.members.len() == items.len() {

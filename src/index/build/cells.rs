@@ -1,7 +1,7 @@
 //! Octree and quadtree: regular subdivision into cells.
 //!
-//! An item descends with its centre, and nodes are fitted to their items, so that items across
-//! a split plane cost a little overlap and never a collapse.
+//! An item descends by its centre, and nodes are fitted to their items: items across a split plane
+//! cost some overlap, and the tree never collapses.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -15,27 +15,25 @@ use crate::index::{Info, Input, Kind, check_range};
 ///
 /// Meagher 1982, "Geometric modeling using octree encoding"; loose variant Ulrich 2000.
 ///
-/// A textbook octree keeps an item that crosses a split plane at the inner
-/// node. In a flat city, or among needles, nearly everything crosses one and
-/// the tree collapses into a list. Here every item descends with its centre
-/// and each node's bounds are the exact union of its items: crossing items
-/// make neighbours overlap, nothing more. Levels in which all items take the
-/// same child are skipped, and coincident items are halved by size below the
-/// depth limit, so a leaf never exceeds its limit and the build never runs
-/// away.
+/// A textbook octree keeps an item that crosses a split plane at the inner node. In a flat city, or
+/// among needles, nearly every item crosses one and the tree collapses into a list. Here every item
+/// descends by its centre and each node's bounds are the exact union of its items: crossing items
+/// only make neighbours overlap. Levels in which all items take the same child are skipped, and
+/// coincident items are halved by size below the depth limit, so a leaf never exceeds its limit and
+/// the build terminates.
 pub type Octree = Tree<CellBuilder<3>>;
 
 /// A quadtree over the two axes in which the scene is widest.
 ///
-/// Finkel and Bentley 1974. Node bounds are fitted and three-dimensional, so that the
-/// height still culls.
+/// Finkel and Bentley 1974. Node bounds are fitted and three-dimensional, so that the height still
+/// culls.
 ///
-/// For terrain, cities and maps, which are flat. Cells that are much higher than wide
-/// are columns of slabs with as many items each (docs/adr/0012); in a flat scene
-/// there are none. Crossing and coincident items are treated as in [`Octree`].
+/// For terrain, cities and maps, which are flat. Cells much higher than wide are columns, divided
+/// into slabs with equal numbers of items (docs/adr/0012); a flat scene has none. Crossing and
+/// coincident items are treated as in [`Octree`].
 pub type Quadtree = Tree<CellBuilder<2>>;
 
-/// Builder of [`Octree`], of three axes, and of [`Quadtree`], of two.
+/// Builder of [`Octree`] (three axes) and [`Quadtree`] (two).
 pub struct CellBuilder<const AXES: usize>;
 
 impl<const AXES: usize> TreeBuilder for CellBuilder<AXES> {
@@ -60,7 +58,7 @@ impl<const AXES: usize> TreeBuilder for CellBuilder<AXES> {
         check_range(name, "loose", params.loose.into(), 1.0, 16.0)?;
         let bounds = Aabb::union_of(input.items);
         let axes = widest_axes::<AXES>(&bounds);
-        // The one that is left over.
+        // The remaining axis.
         let axis = 3 - axes.iter().sum::<usize>();
         let mut splitter = CellSplitter {
             axes: &axes,
@@ -84,7 +82,7 @@ impl<const AXES: usize> TreeBuilder for CellBuilder<AXES> {
     }
 }
 
-/// Axes in which the bounds are widest, ascending: all, or not the narrowest.
+/// Axes in which the bounds are widest, ascending: all, or all but the narrowest.
 pub fn widest_axes<const AXES: usize>(bounds: &Aabb) -> [usize; AXES] {
     let width = bounds.half_extent();
     let narrowest = (0..3).rev().min_by(|&a, &b| width[a].total_cmp(&width[b]));
@@ -103,8 +101,8 @@ defaults! {
         pub depth: u32 = 24,
         /// Looseness (1 to 16) of the cells.
         ///
-        /// 1 sends every item down with its centre; k > 1 keeps items larger than k - 1
-        /// edges of the smaller cell where they are.
+        /// 1 lets every item descend by its centre; k > 1 keeps items larger than k - 1 edges of
+        /// the child cell at the parent.
         pub loose: f32 = 1.0,
     }
 }
@@ -121,21 +119,20 @@ struct Cell {
 /// Splits cells in the middle of each of `axes`.
 struct CellSplitter<'a> {
     axes: &'a [usize],
-    /// Treatment of cells that are too high for their width.
+    /// Treatment of cells that are too high for their width; `None` for an octree.
     columns: Option<Columns>,
-    /// Most splits on the way from the root.
+    /// Most splits along a path from the root.
     depth: u32,
-    /// Edges of the next smaller cell that an item must exceed to stay at a cell.
+    /// Edges of the child cell that an item must exceed to stay at the parent.
     ///
-    /// With looseness (Ulrich, "Loose octrees", Game Programming Gems 1, p. 444) cells
-    /// count as grown by that factor, so this is `loose - 1`; infinite for items that
-    /// always descend.
+    /// With looseness (Ulrich, "Loose octrees", Game Programming Gems 1, p. 444) cells count as
+    /// grown by that factor, so this is `loose - 1`; infinite for items that always descend.
     reach: f32,
     sorted: Vec<Record>,
 }
 
 impl CellSplitter<'_> {
-    /// The child cell of an item; the number of cells for an item that stays.
+    /// The child cell of an item; the number of cells if the item stays.
     fn child(&self, cell: &Cell, b: &Aabb) -> usize {
         if b.extent().max_element() > self.reach * cell.half {
             return 1 << self.axes.len();
@@ -164,28 +161,28 @@ impl CellSplitter<'_> {
     }
 }
 
-/// The cut of a column, a cell with many items above each other, into slabs.
+/// Division of columns into slabs; a column has many items above each other.
 ///
-/// Cells that leave one axis alone become ever narrower columns over the full
-/// height of the world. Where that is high, a leaf is a thin needle, and even a
-/// small view grazes many. So a cell is split on only while a cube of its width
-/// would hold more than some leaves; then its items are sorted by height and
-/// stacked, the same number in each slab.
+/// Splitting two axes only makes cells ever narrower columns over the full height of the world. In
+/// a high world a leaf becomes a thin needle, and even a small view grazes many. So a cell is split
+/// only while a cube of its width would hold more than [`LEAVES_OF_A_CUBE`] leaves; then its items
+/// are sorted by height and divided into slabs of equal numbers.
 struct Columns {
     axis: usize,
     leaf: usize,
 }
 
-/// A cell is a column once a cube of its width would hold fewer than this
-/// many leaves. A split makes that number eight times less, so slabs come
-/// out between a third as high as they are wide and three times as high.
+/// Leaves in a cube of a cell's width below which the cell is a column.
+///
+/// A split divides that number by eight, so the height of slabs is between 1/3 and 3 times their
+/// width.
 const LEAVES_OF_A_CUBE: f32 = 3.0;
 
-/// Most slabs of one node: one test of sixteen.
+/// Most slabs per node: one test of sixteen.
 const SLABS: usize = 16;
 
 impl Columns {
-    /// Decides whether the items of a cell are stacked. O(items).
+    /// Decides whether a cell is divided into slabs. O(items).
     fn is_column(&self, cell: &Cell, records: &[Record]) -> bool {
         let centres = Aabb::of_points(records.iter().map(|record| record.bounds.centre()));
         // Divided first: the product with the number of items may overflow.
@@ -225,7 +222,7 @@ impl Splitter for CellSplitter<'_> {
             {
                 return columns.stack(records, cell, parts);
             }
-            // At most eight cells, and one place for items that stay.
+            // At most eight cells, and one slot for items that stay.
             let mut counts = [0; 9];
             for record in records.iter() {
                 counts[self.child(&cell, &record.bounds)] += 1;
@@ -236,7 +233,7 @@ impl Splitter for CellSplitter<'_> {
                 if only == cells || is_point || cell.half == 0.0 {
                     return;
                 }
-                // A level without a choice is no level: on to the one child.
+                // A level without a choice is skipped: continue with the only child.
                 cell = Cell {
                     level: cell.level,
                     ..self.child_cell(&cell, only)
@@ -298,16 +295,16 @@ mod tests {
         quadtree.expect("boxes on a grid").tree
     }
 
-    /// A sky box, a lost projectile: levels without a choice do not use up the depth.
+    /// A sky box, a lost projectile: levels without a choice do not consume depth.
     #[test]
     fn an_item_far_away_or_around_all_does_not_spoil_the_tree() {
-        // In an order that says nothing of their places.
+        // Shuffled: ids do not follow positions.
         let grid = grid([24; 3]);
         let items: Vec<Aabb> = (0..grid.len())
             .map(|i| grid[i * 5003 % grid.len()])
             .collect();
         let view = ConvexVolume::of_box(&Aabb::new(Vec3::splat(5.0), Vec3::splat(9.0)));
-        // Codes of 42 bits do not reach as far as halving.
+        // Codes of 42 bits resolve less than halving.
         let names = [
             ("octree", 3),
             ("quadtree", 3),
@@ -336,7 +333,7 @@ mod tests {
 
     #[test]
     fn leaves_of_a_high_world_are_no_needles() {
-        // About 3 times as high as wide at most, but a grid has no fractions.
+        // At most about 3 times as high as wide, but a grid has whole layers only.
         for (counts, height) in [([32; 3], 2), ([40, 64, 48], 0), ([64, 16, 64], 1)] {
             let tree = built(&grid(counts));
             let nodes = 0..tree.nodes().len();
@@ -380,14 +377,14 @@ mod tests {
 
     #[test]
     fn towers_are_cut_in_slabs() {
-        // Items above each other, which no split of the two axes separates.
+        // Items above each other, which splits of the two axes cannot separate.
         let ground = |i: u32| [(i & 1) as f32 * 4000.0, (i >> 1 & 1) as f32 * 4000.0];
         let items: Vec<Aabb> = (0..4000)
             .map(|i| (ground(i), (i / 4) as f32))
             .map(|([x, y], z)| Aabb::new(Vec3::new(x, y, z), Vec3::new(x, y, z + 1.0)))
             .collect();
         let tree = built(&items);
-        // The world, four towers, sixteen slabs of 62 or 63 each, two of those each.
+        // The root, four towers, sixteen slabs of 62 or 63 each, two leaves each.
         assert_eq!(tree.nodes().len(), 1 + 4 + 64 + 128);
         let leaves = (0..tree.nodes().len()).filter(|&node| is_leaf(tree.nodes(), node));
         let highest = leaves.map(|leaf| tree.nodes()[leaf].bounds.extent().z);

@@ -1,9 +1,7 @@
 //! Builders of packed trees.
 //!
-//! Each implements [`TreeBuilder`](super::tree::TreeBuilder).
-//!
-//! `bvh` (its clustering in `ploc`), `bsp` (its choice of planes in `bsp_split_planes`),
-//! and `cells` with octree and quadtree.
+//! Each implements [`TreeBuilder`](super::tree::TreeBuilder): `bvh` (clustering in `ploc`), `bsp`
+//! (planes chosen in `bsp_split_planes`), and `cells` for octree and quadtree.
 
 pub mod bsp;
 pub mod bsp_split_planes;

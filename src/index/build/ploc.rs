@@ -1,14 +1,13 @@
 //! The binary tree that crate obvhs builds.
 //!
-//! The steps of its helper `build_bvh2` without the validation that ends it in debug builds.
-//! The validation recurses once a level and compares with a depth noted before reinsertion, which may
-//! have made the tree deeper: deep trees panic or overflow the stack. No walk here relies on
-//! either.
+//! The steps of its helper `build_bvh2`, without the validation that the helper runs in debug
+//! builds. The validation recurses once per level and compares with a depth noted before
+//! reinsertion, which may have deepened the tree: deep trees panic or overflow the stack. No walk
+//! here relies on either.
 //!
-//! The crate takes quadratic time where few neighbours agree in a round of clustering,
-//! as in a row of posts or of growing boxes, and where boxes lie in one another. Here
-//! that has a bound, and one item far away does not take the others' order; the trees
-//! of other scenes are the crate's own.
+//! The crate takes quadratic time if few neighbours agree in a round of clustering, as in a row of
+//! posts or of growing boxes, and if boxes lie in one another. Here both are bounded, and a single
+//! far item does not spoil the order of the others; the trees of other scenes are the crate's own.
 
 use glam::DVec3;
 use obvhs::bvh2::Bvh2;
@@ -31,8 +30,7 @@ impl Boundable for Aabb {
 /// Clusters boxes bottom-up (PLOC), reinserts, and merges leaves.
 ///
 /// The steps of obvhs 0.4.0 with the same parameters; `pre_split` is for triangles only. O(n log
-/// n): clustering has a bound, and what would be reinserted in quadratic time stays where
-/// it is.
+/// n): clustering is bounded, and reinsertion is skipped where it would take quadratic time.
 pub fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     let mut tree = clustered(boxes, &params);
     let share = params.reinsertion_batch_ratio;
@@ -51,9 +49,9 @@ fn reinsert(tree: &mut Bvh2, share: f32) {
     }
 }
 
-/// Nodes sampled to count the others that contain them.
+/// Number of nodes sampled to count the others that contain them.
 const SAMPLE: usize = 1024;
-/// Most nodes that contain one on average. Ten to forty are usual.
+/// Most nodes that contain a node, on average. Ten to forty are usual.
 const MOST_AROUND: usize = 150;
 
 /// Decides whether reinsertion would take quadratic time.
@@ -61,7 +59,7 @@ const MOST_AROUND: usize = 150;
 /// The search for a better position visits all nodes that contain the reinserted one.
 fn is_nested(tree: &Bvh2, share: f32) -> bool {
     let nodes = &tree.nodes;
-    // As obvhs rounds it, which above 2^24 nodes may be up.
+    // As obvhs rounds it: above 2^24 nodes possibly up.
     let candidates = (nodes.len() as f32 * (2.0 * share).min(1.0)) as usize;
     let candidates = candidates.min(nodes.len());
     let step = candidates.div_ceil(SAMPLE).max(16);
@@ -85,14 +83,15 @@ fn is_nested(tree: &Bvh2, share: f32) -> bool {
     false
 }
 
-/// Clusters that all rounds together may look at, as a multiple of the boxes: three
-/// to six are usual.
+/// Clusters that all rounds together may visit, as a multiple of the boxes.
+///
+/// Three to six are usual.
 const CREDIT: usize = 10;
 
-/// PLOC: repeatedly merges clusters that are each other's nearest neighbour.
+/// PLOC: repeatedly merges clusters that are mutual nearest neighbours.
 ///
-/// The nearest neighbour in Morton order is the one with the least common bounds. Once
-/// the credit is spent, neighbours merge two by two.
+/// The nearest neighbour in Morton order is the one with the least surface of common bounds. Once
+/// the credit is spent, adjacent clusters merge in pairs.
 fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
@@ -101,7 +100,7 @@ fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
         SortPrecision::U64 => in_morton_order(boxes, morton_encode_u64_unorm),
         SortPrecision::U128 => in_morton_order(boxes, morton_encode_u128_unorm),
     };
-    // One item far away or around all, such as a sky box, leaves few codes to the others.
+    // One item far away or around all others, such as a sky box, leaves them few distinct codes.
     if ties > boxes.len() / 2 {
         clusters = in_morton_order(boxes, morton_encode_u128_unorm).0;
     }
@@ -152,10 +151,10 @@ fn reach(distance: PlocSearchDistance) -> usize {
     }
 }
 
-/// The least area of bounds with a neighbour so far, and that neighbour.
+/// The least area of bounds shared with a neighbour so far, and that neighbour.
 type Nearest = (f32, u32);
 
-/// Finds, for each cluster, the last of the nearest ones at most `reach` away.
+/// Finds each cluster's nearest neighbour at most `reach` away, the last of ties.
 fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
     found.clear();
     found.extend((0..clusters.len() as u32).map(|i| (f32::INFINITY, i)));
@@ -174,14 +173,14 @@ fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
     }
 }
 
-/// Pairs clusters two by two.
+/// Pairs adjacent clusters.
 fn pair(clusters: usize, found: &mut Vec<Nearest>) {
     found.clear();
     let last = clusters as u32 - 1;
     found.extend((0..=last).map(|i| (0.0, (i ^ 1).min(last))));
 }
 
-/// A box's place, by the code of its centre.
+/// A box's index with the code of its centre.
 #[derive(Clone, Copy)]
 struct Coded<C> {
     code: C,
@@ -197,9 +196,9 @@ impl<C: RadixKey> RadixKey for Coded<C> {
     }
 }
 
-/// The boxes as leaves in the order of their codes, and the number of equal codes.
+/// The boxes as leaves in the order of their codes; the number of equal codes.
 ///
-/// Boxes with one code come in the crate's order.
+/// Boxes with one code are in the crate's order.
 fn in_morton_order<C>(boxes: &[Aabb], code: impl Fn(DVec3) -> C) -> (Vec<Bvh2Node>, usize)
 where
     C: RadixKey + Copy + Ord + Send + Sync,
@@ -230,14 +229,14 @@ mod tests {
 
     use super::*;
 
-    /// The slowest preset, one item a leaf.
+    /// The slowest preset, one item per leaf.
     const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
         max_prims_per_leaf: 1,
         pre_split: false,
         ..BvhBuildParams::very_slow_build()
     };
 
-    /// Boxes in no order, some of which share their centre or their bounds.
+    /// Boxes in random order, some with a common centre or common bounds.
     fn scattered(n: usize) -> Vec<Aabb> {
         let mut state = 5_u64;
         let mut unit = || {
@@ -275,7 +274,7 @@ mod tests {
         }
     }
 
-    /// Clustering by agreement alone takes as many rounds as there are boxes.
+    /// Clustering by mutual neighbours alone takes as many rounds as there are boxes.
     #[test]
     fn rounds_are_few_where_few_neighbours_agree() {
         let rows: [fn(f32) -> Aabb; 5] = [

@@ -1,7 +1,7 @@
 //! The scan of a game engine, after the visibility system of Bevy.
 //!
-//! One record an entity with its flags and bounds, one test after the other, the flag set, the
-//! visible ones listed. A stand-in, not Bevy's own code: `bevy_camera` brings two hundred
+//! One record per entity with its flags and bounds; each is tested in turn, its flag set, and
+//! visible ones are listed. A stand-in, not Bevy's own code: `bevy_camera` pulls in two hundred
 //! crates, and its test (centre and half-extents, a sphere first) rounds differently, so its
 //! answers could not be compared.
 
@@ -14,10 +14,10 @@ use crate::index::items::{Positions, Record};
 use crate::index::{BuildError, Info, Kind, MemoryUsage, NoParams, Origin};
 use crate::query::{Context, ItemId};
 
-/// The components of an entity that the system reads and writes.
+/// The components of an entity that the visibility system reads and writes.
 struct Entity {
     item: Record,
-    /// Bits of the layers that it is drawn on.
+    /// Bit mask of the entity's render layers.
     layers: u32,
     inherited_visibility: bool,
     no_frustum_culling: bool,
@@ -65,7 +65,7 @@ impl BoxTested for PeerBevyStyle {
         })
     }
 
-    /// Overwrites the bounds; an entity that is gone is hidden, a new one spawned.
+    /// Overwrites the bounds; hides entities that are gone, spawns new ones.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         let ids = self.entities.iter().map(|entity| &entity.item.id);
         self.positions.prepare(ids, items.len());

@@ -46,7 +46,8 @@ fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     )
 }
 
-/// A test for the crate, which does not distinguish boxes of nodes and items.
+/// A test in the crate's form, which treats boxes of nodes and items alike.
+///
 /// Returned items are tested once more if the two tests can differ.
 struct Query<'a, T: ?Sized, R> {
     test: &'a T,
@@ -64,24 +65,26 @@ impl<T: BoxTest + ?Sized, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, T, R
     }
 }
 
-/// Boxes of this reach have areas that are still numbers in f32.
+/// Most reach of boxes whose areas are finite in f32.
 const LARGEST: f32 = 1e18;
 
-/// In scenes of this reach the crate's builder, whose epsilon is 1e-5, still tells
-/// centres apart.
+/// Least reach of a scene in which the crate's builder separates centres.
+///
+/// The builder's epsilon is 1e-5.
 const SMALLEST: f32 = 1e-4;
 
 /// Number of shapes above which an update by shapes is slow.
 ///
-/// It takes as long as a build from three eighths moved on, below from three quarters on.
+/// Above, it takes as long as a build once three eighths have moved; below, once three quarters
+/// have.
 const LARGE: usize = 10_000;
 
-/// The crate's tree; true if over shapes scaled to a reach of 1,000.
+/// The crate's tree; true if it was built over shapes scaled to a reach of 1,000.
 ///
-/// Its nodes are then fitted.
+/// The nodes of such a tree are then fitted to the shapes.
 ///
-/// If areas overflow, the crate's builder finds no cheapest split and
-/// leaves both children with empty boxes; where widths overflow, it panics.
+/// If areas overflow, the crate's builder finds no cheapest split and leaves both children with
+/// empty boxes; if widths overflow, it panics.
 fn tree(shapes: &mut [Shape]) -> (Bvh<f32, 3>, bool) {
     let scene = Aabb::union_of(shapes.iter().map(|shape| &shape.item.bounds));
     let reach = scene.reach().max_element();
@@ -143,13 +146,13 @@ impl BoxTested for PeerBvh {
 
     /// `remove_shape` and `add_shape`, as `update_shapes` calls them, or a build.
     ///
-    /// A build is faster where most shapes have moved, and needed where areas overflow.
-    /// The shape of an item that is gone stays in the list, empty and without a node.
+    /// A build is faster if most shapes have moved, and needed if areas overflow. The shape of an
+    /// item that is gone stays in the list, empty and without a node.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         let ids = self.shapes.iter().map(|shape| &shape.item.id);
         self.positions.prepare(ids, items.len());
         let mut moved = moved.to_vec();
-        // The crate adds a shape as often as it is named.
+        // The crate adds a shape once per mention.
         moved.sort_unstable();
         moved.dedup();
         let (mut removed, mut added, mut overflows) = (Vec::new(), Vec::new(), false);
@@ -219,8 +222,7 @@ mod tests {
     use crate::index::{FrustumQuery, Input, RegionIndex};
     use glam::Vec3;
 
-    /// Left to the crate, nothing is found where areas overflow, and where
-    /// widths do there is no tree.
+    /// The crate alone finds nothing if areas overflow and panics if widths do.
     #[test]
     fn points_without_an_area_or_too_far_apart_for_one_are_found() {
         found(|i| Vec3::X * f32::from(i));

@@ -1,9 +1,9 @@
-//! Structures of other crates, one file per crate, checked like our own.
+//! Structures of other crates, one file per crate, checked like ours.
 //!
-//! Each gets its test one box at a time (`box_test`). docs/PEERS.md has the calls.
+//! Each is given a test of one box at a time (`box_test`). docs/PEERS.md lists the calls.
 //!
-//! A peer's own code was compiled for the portable instruction set, unless the
-//! compiler inlines it into the kernel that calls it.
+//! A peer's code is compiled for the portable instruction set, unless the compiler inlines it into
+//! the kernel that calls it.
 
 mod bevy_style;
 mod bvh;
@@ -33,7 +33,7 @@ mod tests {
 
     /// A row of denormal points overflows the stack of parry3d's builder.
     ///
-    /// Rows and stacks of points take quadratic time by obvhs's own clustering.
+    /// Rows and stacks of points take quadratic time in obvhs's own clustering.
     #[test]
     fn rows_of_points_are_refused_or_built_soon() {
         let row = |step: f32, n: u16| -> Vec<Aabb> {
@@ -106,7 +106,7 @@ mod tests {
             let empty = Aabb::new(Vec3::ONE, Vec3::ZERO);
             let all = ConvexVolume::from_planes(&[]).expect("no planes");
             for frame in 0..60_u32 {
-                // All come or go in the last frames.
+                // In the last frames all come or go.
                 let step = [61, 17, 1][frame as usize / 20];
                 let moved: Vec<u32> = (frame % 7..900).step_by(step).collect();
                 for &id in &moved {

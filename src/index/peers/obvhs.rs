@@ -1,8 +1,8 @@
-//! The crate obvhs by its own tree.
+//! The crate obvhs with its own tree.
 //!
-//! Its nodes in its order, its ids through `primitive_indices`. It has no frustum traversal, so
-//! its public nodes are walked as its own traversals do. The structure `bvh` reorders a tree of
-//! the same builder.
+//! Nodes are in the crate's order, ids go through `primitive_indices`. The crate has no frustum
+//! traversal, so its public nodes are walked in the manner of its own traversals. The structure
+//! `bvh` reorders a tree of the same builder.
 
 use std::ops::ControlFlow;
 
@@ -30,25 +30,25 @@ pub struct ObvhsParams {
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObvhsUpdate {
-    /// `resize_node` for each leaf, or `refit_all` from one moved item in 32 on.
+    /// `resize_node` per leaf; `refit_all` once one item in 32 has moved.
     #[default]
     Refit,
     /// `move_primitive`; leaves of several items are refitted.
     Move,
 }
 
-/// An update refits all nodes from one moved item in as many on.
+/// An update refits all nodes once one item in this number has moved.
 const ALL_SHARE: usize = 32;
 
 /// The crate's tree by its medium preset; items in the order of its primitives.
 #[derive(Default)]
 pub struct PeerObvhs {
     bvh: Bvh2,
-    /// Empty where every leaf is one item, whose bounds are then the leaf's.
+    /// Empty if every leaf has one item: the leaf has its bounds.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
     positions: Positions,
-    /// Numbers of the crate's primitives that were removed.
+    /// Indices of the crate's primitives that were removed.
     free: Vec<u32>,
     update: ObvhsUpdate,
 }
@@ -59,7 +59,7 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
 }
 
 impl PeerObvhs {
-    /// Removes an item; the last one of its leaf takes its place, as the crate has it.
+    /// Removes an item; the last one of its leaf takes its place, as in the crate.
     fn remove(&mut self, id: ItemId, place: usize) {
         let primitive = self.bvh.primitive_indices[place];
         let leaf = &self.bvh.nodes[self.bvh.primitives_to_nodes[primitive as usize] as usize];
@@ -137,7 +137,7 @@ impl BoxTested for PeerObvhs {
             }
             bvh.refit_all();
         }
-        // A walk keeps one entry a level; the crate's default is 96.
+        // A walk keeps one entry per level; the crate's default is 96.
         bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);
         let single = bvh.nodes.iter().all(|node| node.prim_count <= 1);
         let of = |&place: &u32| items[place as usize];
@@ -203,7 +203,7 @@ impl BoxTested for PeerObvhs {
             &bvh.primitives_to_nodes,
             &bvh.parents,
         ];
-        // A leaf of one item has its bounds.
+        // A leaf of one item has the item's bounds.
         let items_in_nodes = usize::from(self.boxes.is_empty()) * self.ids.len();
         let leaves = items_in_nodes * size_of::<Bvh2Node>();
         MemoryUsage {
@@ -232,7 +232,7 @@ impl BoxTested for PeerObvhs {
         let mut open = Stack::new(root.first_index);
         while let Some(first) = open.pop() {
             for node in [&nodes[first as usize], &nodes[first as usize + 1]] {
-                // A leaf of one item has the bounds of the item: it needs no second test.
+                // A leaf of one item has the item's bounds: no second test.
                 if node.prim_count != 1 && ask.rejects(&bounds_of(node)) {
                     continue;
                 }

@@ -1,4 +1,4 @@
-//! The crate parry3d's BVH in its default build.
+//! The crate parry3d's BVH with its default builder.
 //!
 //! Queried through `traverse_indexed`, which lets whole subtrees be accepted.
 
@@ -29,39 +29,38 @@ pub struct Parry3dParams {
 pub enum Parry3dUpdate {
     /// `insert_or_update_partially`, then `refit_partial`.
     ///
-    /// `refit` in its place from one moved item in eight on.
+    /// `refit` instead, once one item in eight has moved.
     #[default]
     Refit,
     /// `insert_or_update_partially`, `refit`, then `optimize_incremental`.
     ///
-    /// The crate allows no `refit_partial` after an `optimize_incremental`.
+    /// The crate forbids `refit_partial` after an `optimize_incremental`.
     Optimize,
     /// `reinsert_or_update_with_change_detection`.
     Reinsert,
 }
 
-/// The crate's tree by its binned builder, whose leaves are ids.
+/// The crate's tree by its binned builder, with ids as leaves.
 ///
-/// Subtrees that are wholly inside are not tested further.
+/// Subtrees wholly inside are not tested further.
 pub struct PeerParry3d {
     bvh: Bvh,
     update: Parry3dUpdate,
     workspace: BvhWorkspace,
 }
 
-/// Most distinct centres in too narrow a space.
+/// Most distinct centres within too narrow an extent.
 ///
-/// The crate's builder splits them off one by one and recurses for each, which 2 MiB of
-/// stack hold.
+/// The crate's builder splits them off one by one and recurses for each; 2 MiB of stack suffice.
 const MOST_NARROW: usize = 2048;
-/// Extents of centres whose eight bins overflow the builder's scale of f32.
+/// Extent of centres below which eight bins overflow the builder's f32 scale.
 const TOO_NARROW: f32 = 8.0 / f32::MAX;
 
 /// Refuses items that would overflow the stack of the builder. O(n log n).
 fn refuse_narrow(structure: &'static str, items: &[Record]) -> Result<(), BuildError> {
     for axis in 0..3 {
         let centres = items.iter().map(|item| item.bounds.centre()[axis]);
-        // Distinct numbers farther from zero differ by more.
+        // Distinct numbers farther from zero differ by more than the extent.
         let mut centres: Vec<f32> = centres.filter(|c| c.abs() < 1e-30).collect();
         centres.sort_unstable_by(f32::total_cmp);
         centres.dedup();
@@ -82,7 +81,7 @@ fn crate_box(b: &Aabb) -> ParryAabb {
     ParryAabb::new(vector(b.min), vector(b.max))
 }
 
-/// An update refits all nodes from one moved item in as many on.
+/// An update refits all nodes once one item in this number has moved.
 const ALL_SHARE: usize = 8;
 
 #[inline(always)]
@@ -91,7 +90,7 @@ fn bounds_of(node: &BvhNode) -> Aabb {
     Aabb::new(vector(node.mins()), vector(node.maxs()))
 }
 
-/// The action for the crate, which is to end with the sink.
+/// The action for the crate; stops the traversal if the sink ended the query.
 #[inline(always)]
 fn unless_ended(flow: ControlFlow<()>, action: TraversalAction) -> TraversalAction {
     match flow {
@@ -115,7 +114,7 @@ impl BoxTested for PeerParry3d {
         let leaf = |item: &Record| (item.id as usize, crate_box(&item.bounds));
         let leaves = items.iter().map(leaf);
         let bvh = match items.len() {
-            // The builder takes these for the leaves 0 and 1.
+            // With up to two items the builder ignores the ids and numbers the leaves 0 and 1.
             0..=2 => {
                 let mut bvh = Bvh::new();
                 leaves.for_each(|(id, bounds)| bvh.insert(bounds, id as u32));
@@ -131,7 +130,7 @@ impl BoxTested for PeerParry3d {
     }
 
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
-        // After a removal the crate allows no `refit_partial`.
+        // After a removal the crate forbids `refit_partial`.
         let mut removes = false;
         for &leaf in moved {
             if items[leaf as usize].is_empty() {
@@ -140,7 +139,7 @@ impl BoxTested for PeerParry3d {
                 continue;
             }
             let bounds = crate_box(&items[leaf as usize]);
-            // A leaf that holds the new bounds would keep its old ones.
+            // A leaf that contains the new bounds would keep its old ones.
             let holds = || (self.bvh.leaf_node(leaf)).is_some_and(|n| n.contains_aabb(&bounds));
             if self.update == Parry3dUpdate::Reinsert && !holds() {
                 (self.bvh).reinsert_or_update_with_change_detection(bounds, leaf, 0.0);
@@ -164,10 +163,10 @@ impl BoxTested for PeerParry3d {
     }
 
     fn used(&self) -> MemoryUsage {
-        // The crate counts the index of a leaf as a number; it stores an Option.
+        // The crate counts a leaf's index as a number but stores an Option.
         let held = self.bvh.leaf_count() as usize;
         let uncounted = held * (size_of::<Option<usize>>() - size_of::<usize>());
-        // Half of the nodes are the leaves.
+        // Half of the nodes are leaves.
         let leaves = held * size_of::<BvhNode>();
         MemoryUsage {
             node_bytes: (self.bvh.heap_memory_size() + uncounted).saturating_sub(leaves),
@@ -175,7 +174,7 @@ impl BoxTested for PeerParry3d {
         }
     }
 
-    /// Traverses an accepted subtree once more, without tests.
+    /// Traverses an accepted subtree a second time, without tests.
     #[inline(always)]
     fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let mut flow = ControlFlow::Continue(());

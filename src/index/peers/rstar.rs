@@ -36,11 +36,11 @@ fn slots(node: &ParentNode<Record>) -> usize {
 /// The crate's tree, with the items in its leaves.
 pub struct PeerRstar {
     tree: RTree<Record>,
-    /// Bounds in the tree by id, empty for others; none before the first update.
+    /// Bounds in the tree by id, empty if absent; no entries before the first update.
     bounds: Vec<Aabb>,
 }
 
-/// An update bulk-loads from one moved item in as many on.
+/// An update bulk-loads once one item in this number has moved.
 const BULK_SHARE: usize = 4;
 
 impl BoxTested for PeerRstar {
@@ -60,7 +60,7 @@ impl BoxTested for PeerRstar {
         })
     }
 
-    /// `remove` and `insert`, item by item; `bulk_load` from a quarter moved on.
+    /// `remove` and `insert` per item; `bulk_load` once a quarter has moved.
     fn follow(&mut self, items: &[Aabb], moved: &[ItemId]) -> Option<()> {
         if self.bounds.is_empty() {
             self.bounds = vec![Aabb::EMPTY; items.len()];
@@ -99,8 +99,9 @@ impl BoxTested for PeerRstar {
         }
     }
 
-    /// Walks the nodes in the order of the crate's iterator; the subtree of an accepted
-    /// node is not tested further.
+    /// Walks the nodes in the order of the crate's iterator.
+    ///
+    /// The subtree of an accepted node is not tested further.
     #[inline(always)]
     fn search<T: BoxTest + ?Sized, C: Context>(&self, ask: &mut BoxQuery<T, C>) -> ControlFlow<()> {
         let root = self.tree.root();

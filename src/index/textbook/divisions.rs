@@ -1,4 +1,4 @@
-//! The textbook trees: the division of octree, quadtree, BSP tree and BVH.
+//! The textbook trees: how octree, quadtree, BSP tree and BVH divide items.
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
@@ -13,26 +13,26 @@ use crate::index::{Input, ploc};
 
 /// An octree as the lecture on visibility describes it.
 ///
-/// Meagher 1982, "Geometric modeling using octree encoding"; slides "Visibility", "Region
-/// search". O(log n + answers) per query where items are small against their cells.
+/// Meagher 1982, "Geometric modeling using octree encoding"; slides "Visibility", "Region search".
+/// O(log n + answers) per query if items are small against their cells.
 ///
-/// An item that crosses the middle of a cell stays with the cell, however small it is,
-/// and every query that reaches the cell tests it: not so in [`Octree`](crate::index::Octree),
-/// whose items all descend with their centres, nor in loose octrees (Ulrich 2000).
+/// An item that crosses the middle of a cell stays with the cell, however small it is, and every
+/// query that reaches the cell tests it. Not so in [`Octree`](crate::index::Octree), whose items
+/// all descend by their centres, nor in loose octrees (Ulrich 2000).
 pub type OctreeTextbook = Textbook<Cells<3>>;
 
 /// A quadtree over boxes as the lecture on visibility describes it.
 ///
-/// Finkel and Bentley 1974, "Quad trees: a data structure for retrieval on composite keys";
-/// slides "Visibility", "Region search".
+/// Finkel and Bentley 1974, "Quad trees: a data structure for retrieval on composite keys"; slides
+/// "Visibility", "Region search".
 ///
-/// An item lies with the smallest cell that contains it ([`OctreeTextbook`]). Cells
-/// are columns through the whole scene, over the two axes in which it is widest. Takes
-/// O(log n + answers) per query where the scene is flat and items are small against their
-/// cells; nothing is culled by height.
+/// An item belongs to the smallest cell that contains it ([`OctreeTextbook`]). Cells are columns
+/// through the whole scene, over the two axes in which it is widest, so nothing is culled by
+/// height. O(log n + answers) per query if the scene is flat and items are small against their
+/// cells.
 pub type QuadtreeTextbook = Textbook<Cells<2>>;
 
-/// Division of [`OctreeTextbook`], of three axes, and of [`QuadtreeTextbook`].
+/// Division of [`OctreeTextbook`] (three axes) and [`QuadtreeTextbook`] (two).
 pub struct Cells<const AXES: usize>;
 
 impl<const AXES: usize> Division for Cells<AXES> {
@@ -52,7 +52,7 @@ impl<const AXES: usize> Division for Cells<AXES> {
     }
 }
 
-/// The cell of a whole scene: as wide on each of the axes that are cut.
+/// The cell of a whole scene: equally wide on each of the axes that are cut.
 fn root_cell(scene: &Aabb, axes: &[usize]) -> Aabb {
     // Halved before subtracting and clamped: bounds may span the range of f32.
     let half = scene.half_extent();
@@ -60,14 +60,14 @@ fn root_cell(scene: &Aabb, axes: &[usize]) -> Aabb {
     let cube = Aabb::around(scene.centre(), Vec3::splat(widest));
     let mut cell = *scene;
     for &axis in axes {
-        // Rounding may have put a face of the cube within the scene.
+        // Rounding may have moved a face of the cube into the scene.
         cell.min[axis] = cube.min[axis].min(scene.min[axis]).max(f32::MIN);
         cell.max[axis] = cube.max[axis].max(scene.max[axis]).min(f32::MAX);
     }
     cell
 }
 
-/// A cell with its items and subtrees; children without items are left out.
+/// A cell with its items and subtrees, without empty children.
 ///
 /// Bit `k` of a child's number is its side of the middle of `axes[k]`.
 fn divided(
@@ -84,7 +84,7 @@ fn divided(
     let mut below: Vec<(Aabb, Vec<Record>)> = cells.map(|cell| (cell, Vec::new())).collect();
     let mut own = Vec::new();
     for record in records {
-        // Closed bounds: on a face, the first of the cells that share it.
+        // Closed bounds: an item on a shared face goes to the first of the cells.
         let mut cells = below.iter_mut();
         match cells.find(|(cell, _)| cell.contains(&record.bounds)) {
             Some((_, items)) => items.push(record),
@@ -98,7 +98,9 @@ fn divided(
     node
 }
 
-/// A part of a cell. Its faces are the cell's or the middle, so parts meet exactly.
+/// An octant (quadrant) of a cell.
+///
+/// Its faces are the cell's or the middle, so parts meet exactly.
 fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
     let (mut part, middle) = (*cell, cell.centre());
     for (bit, &axis) in axes.iter().enumerate() {
@@ -112,11 +114,11 @@ fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
 
 /// A BSP tree as the lecture on visibility describes it.
 ///
-/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree
-/// structures"; slides "BSP trees" and "Region search".
+/// Fuchs, Kedem and Naylor 1980, "On visible surface generation by a priori tree structures";
+/// slides "BSP trees" and "Region search".
 ///
-/// Region search takes the side of the plane that the point is on: O(log n) where planes
-/// cut few items. A frustum is tested against the bounds of each node's items.
+/// Region search descends to the point's side of each plane: O(log n) if planes cut few items. A
+/// frustum is tested against the bounds of each node's items.
 pub type BspTextbook = Textbook<DividingPlanes>;
 
 /// Division of [`BspTextbook`].
@@ -135,16 +137,17 @@ impl Division for DividingPlanes {
     }
 }
 
-/// Items on the sides of a plane.
+/// Items by their side of a plane.
 struct Sides {
     plane: Plane,
-    /// Wholly in front, and wholly behind.
+    /// Wholly in front; wholly behind.
     of: [Vec<Record>; 2],
     cut: Vec<Record>,
 }
 
-/// In front of a plane (0), behind it (1), or cut by it. Touching is not cut: walls
-/// that lie in a plane are on its sides.
+/// Side of a box: in front of a plane (0), behind it (1), `None` if cut.
+///
+/// Touching is not cutting: a wall that lies in a plane is on one of its sides.
 fn side_of(plane: &Plane, b: &Aabb) -> Option<usize> {
     if plane.contains(b) {
         return Some(0);
@@ -165,10 +168,10 @@ impl Sides {
     }
 }
 
-/// Rank of a plane, best first.
+/// Rank of a plane, lower is better.
 ///
-/// First the items that its emptier side lacks to a quarter, then the items it cuts,
-/// since every search of the node tests them.
+/// First the number of items by which its emptier side falls short of a quarter, then the number of
+/// items it cuts, since every search of the node tests those.
 fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
     let mut sides = [0, 0];
     for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {
@@ -179,18 +182,19 @@ fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
     (lacking, records.len() - front - back)
 }
 
-/// Source of dividing planes.
+/// Source of candidate planes.
 struct Planes<'a> {
     own: Option<&'a PlaneTree>,
     params: &'a TextbookParams,
 }
 
-/// Boxes per node that offer planes, and items by which the planes are ranked.
+/// Boxes per node that supply candidate planes; items by which planes are ranked.
 const OFFER: usize = 4;
 const JUDGES: usize = 512;
 
-/// The faces of `boxes` of the boxes, and two diagonals through the centre of each:
-/// eight planes per box.
+/// Candidate planes: per box its faces and two diagonals through its centre.
+///
+/// Eight planes per box, from `boxes` of the boxes.
 fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
     let step = records.len().div_ceil(boxes).max(1);
     records.iter().step_by(step).flat_map(|r| {
@@ -203,9 +207,10 @@ fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
 }
 
 impl Planes<'_> {
-    /// The division of some items, with the map's nodes in front and behind; `at` is
-    /// the map's next node. Skips those of its planes with everything on one side.
-    /// `None` if no candidate plane divides the items.
+    /// Divides items; returns the map's nodes in front and behind too.
+    ///
+    /// `at` is the map's next node. Skips the map's planes with all items on one side. `None` if no
+    /// candidate plane divides the items.
     fn sides(&self, records: &[Record], mut at: Option<u32>) -> Option<(Sides, [Option<u32>; 2])> {
         while let Some(own) = at.and_then(|at| self.own?.nodes.get(at as usize)) {
             let sides = Sides::of(own.plane, records);
@@ -245,11 +250,10 @@ impl Planes<'_> {
 
 /// A bounding volume hierarchy in plain recursive form.
 ///
-/// Clark 1976, "Hierarchical geometric models for visible surface algorithms"; the crate
-/// builds it bottom-up, by PLOC: Meister and Bittner 2018. O(log n + answers) per query.
+/// Clark 1976, "Hierarchical geometric models for visible surface algorithms"; built bottom-up by
+/// the crate obvhs (PLOC, Meister and Bittner 2018). O(log n + answers) per query.
 ///
-/// The lecture on visibility does not name it; engines use it instead of the lecture's
-/// trees.
+/// The lecture on visibility does not name it; engines use it instead of the lecture's trees.
 pub type BvhTextbook = Textbook<ObvhsNodes>;
 
 /// Division of [`BvhTextbook`].
@@ -260,12 +264,12 @@ impl Division for ObvhsNodes {
     const SUMMARY: &str = "lecture form: the nodes of crate obvhs, one at a time";
 
     fn root(input: &Input<'_>, mut records: Vec<Record>, params: &TextbookParams) -> Node {
-        // Items with identical bounds are one primitive for the builder, whose search for
-        // the nearest neighbour fails among them.
+        // Items with identical bounds are one primitive for the builder: its nearest-neighbour
+        // search fails among them.
         let key = |r: &Record| r.bounds.bits();
         records.sort_unstable_by_key(|r| (key(r), r.id));
         let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();
-        // At unit size: the builder compares areas, which must not overflow.
+        // Scaled to unit size: the builder compares areas, which must not overflow.
         let reach = Aabb::union_of(input.items).reach().max_element();
         let scale = reach.recip().min(f32::MAX);
         let boxes = stacks.iter().map(|stack| stack[0].bounds.scaled(scale));
@@ -280,8 +284,7 @@ impl Division for ObvhsNodes {
 
 /// A node of obvhs with the exact bounds of its items, which the builder rounds.
 ///
-/// At the deepest level allowed it keeps the items of all leaves below: the builder's
-/// trees may be deeper.
+/// At the depth limit it keeps the items of all leaves below: the builder's trees may be deeper.
 fn subtree(built: &Bvh2, node: Bvh2Node, levels: u32, stacks: &[&[Record]]) -> Node {
     let children = |node: &Bvh2Node| {
         let first = node.first_index as usize;

@@ -1,8 +1,8 @@
 //! The trees as lectures show them: child pointers and a recursive walk.
 //!
 //! One box at a time, no SIMD. Compared with the packed trees they show the effect of a layout;
-//! compared with the scan, of a tree. Here are the node and the walk; `divisions` has a
-//! division per kind of tree.
+//! compared with the scan, that of a tree. Node and walk are here; `divisions` has one division per
+//! kind of tree.
 //!
 //! The walk does not depend on the instruction set, so it is compiled once for all.
 
@@ -31,13 +31,13 @@ defaults! {
         pub leaf: u32 = 8,
         /// Most levels below the root (0 to 256): the depth of the recursion.
         ///
-        /// Items that share a node there, such as coincident ones, stay together.
+        /// Items that share a node at that depth, such as coincident ones, stay together.
         pub depth: u32 = 64,
     }
 }
 
 impl TextbookParams {
-    /// Decides whether a group of items at a level stays together.
+    /// Decides whether a group of items becomes a leaf at this level.
     fn ends_at(&self, items: usize, level: u32) -> bool {
         items <= self.leaf as usize || level == self.depth
     }
@@ -45,15 +45,15 @@ impl TextbookParams {
 
 /// A node with its items and subtrees.
 pub struct Node {
-    /// Closed bounds that contain every item from here down, bit for bit.
+    /// Closed bounds that contain every item of the subtree, bit for bit.
     ///
     /// A verdict about the node holds for all of them (docs/NUMERICS.md).
     bounds: Aabb,
     /// Half-space on one side of a dividing plane.
     ///
-    /// Points outside of it are in none of the items from here down.
+    /// Contains all items of the subtree: a point outside is in none of them.
     half_space: Option<Plane>,
-    /// The items that the node itself keeps, and their ids.
+    /// The node's own items, and their ids.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
     children: Box<[Node]>,
@@ -71,10 +71,11 @@ impl Node {
         }
     }
 
-    /// Passes the items that a volume sees to the sink: no item of a node that lies
-    /// outside, all of one that lies inside; else it tests the node's own items one by
-    /// one, and then its children in the same way. O(log n + answers) where the
-    /// volume and the items are small.
+    /// Passes the items of the subtree that a volume sees to the sink.
+    ///
+    /// None if the node is outside, all if it is inside; else it tests the node's own items one by
+    /// one, then recurses into the children. O(log n + answers) if the volume and the items are
+    /// small.
     fn walk<Q: QueryVolume, C: Context>(
         &self,
         volume: &Q,
@@ -99,13 +100,16 @@ impl Node {
         ControlFlow::Continue(())
     }
 
-    /// Region search by dividing planes. An item in front of a plane has no point
-    /// behind it, by the same arithmetic that decides the point's side: it is monotone.
+    /// Region search by dividing planes.
+    ///
+    /// The plane test is monotone: an item in front of a plane contains no point that the same
+    /// arithmetic puts behind it.
     fn locate<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
         cx.recorder().nodes_tested(1);
         self.test_items(&p, p.mask(), cx)?;
         for child in &self.children {
-            // A point on the plane is on both sides; a NaN (coordinates beyond f32) on none.
+            // A point on the plane is on both sides; one whose value is NaN (beyond f32) on
+            // neither.
             if child.half_space.is_none_or(|side| side.value_at(p) >= 0.0) {
                 child.locate(p, cx)?;
             }
@@ -113,7 +117,7 @@ impl Node {
         ControlFlow::Continue(())
     }
 
-    /// Passes a whole subtree to the sink without a test; its number of items.
+    /// Passes a whole subtree to the sink without a test; returns its number of items.
     fn report<S: Sink>(&self, sink: &mut S) -> ControlFlow<(), usize> {
         if !self.ids.is_empty() {
             sink.accept(&self.ids)?;
@@ -155,16 +159,16 @@ impl Node {
     }
 }
 
-/// The division of a kind of tree.
+/// How one kind of tree divides its items.
 pub trait Division: Send + Sync {
     /// Name of the structure.
     const NAME: &str;
     /// Summary of the structure.
     const SUMMARY: &str;
-    /// True if region search goes by the half-spaces of nodes.
+    /// True if region search descends by the half-spaces of nodes.
     const BY_HALF_SPACES: bool = false;
 
-    /// The root over items, of which there is at least one.
+    /// The root over at least one item.
     fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node;
 }
 

@@ -1,7 +1,7 @@
 //! The packed tree, which `bvh`, `bsp`, `octree` and `quadtree` share.
 //!
-//! [`Tree`] is the structure: a [`PackedTree`] made by a [`TreeBuilder`] (`index/build`),
-//! which decides how items are grouped and whether points descend by planes.
+//! [`Tree`] is the structure: a [`PackedTree`] made by a [`TreeBuilder`] (`index/build`), which
+//! decides how items are grouped and whether points descend by planes.
 //!
 //! | file | contents |
 //! |---|---|
@@ -10,7 +10,7 @@
 //! | `search` | queries by volumes and by points |
 //! | `partition` | top-down construction by a [`Splitter`] |
 //! | `splits` | region search by dividing planes, for `bsp` |
-//! | `tests_recorder` | region search by hand, beside which `scripts/check-recorder.sh` counts |
+//! | `tests_recorder` | a hand-written region search, for `scripts/check-recorder.sh` |
 
 pub mod node;
 mod packed;
@@ -36,7 +36,7 @@ use crate::query::{Context, ItemId, QueryVolume};
 pub use packed::PackedTree;
 pub use partition::{Part, Splitter, build_top_down};
 
-/// A tree with a normal for each node, or none.
+/// A tree, and a normal per node or none at all.
 pub type Built = Result<(PackedTree, Vec<Vec3>), BuildError>;
 
 /// A builder of packed trees; [`Tree<Self>`](Tree) is the structure.
@@ -48,13 +48,12 @@ pub trait TreeBuilder: Send + Sync {
     /// True if points descend by the normals that the build returns.
     const BY_PLANES: bool = false;
 
-    /// Builds the tree, and a normal per node with [`TreeBuilder::BY_PLANES`].
+    /// Builds the tree, and a normal per node if [`TreeBuilder::BY_PLANES`].
     ///
-    /// Such a tree is binary: a plane of an inner node's normal divides its items, those
-    /// on the back first.
+    /// A tree with normals is binary: a plane with the normal of an inner node divides its items,
+    /// those on the back first.
     ///
-    /// # Errors
-    /// The errors of [`RegionIndex::build`].
+    /// # Errors The errors of [`RegionIndex::build`].
     fn build(input: &Input<'_>, params: &Self::Params) -> Built;
 }
 

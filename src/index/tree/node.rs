@@ -1,4 +1,4 @@
-//! A node of the packed tree, and the open nodes of a depth-first traversal.
+//! A node of the packed tree, and the stack of a depth-first traversal.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ pub struct TreeNode {
     pub count: u32,
     /// The node after this subtree in depth-first order.
     ///
-    /// A leaf's is its own successor.
+    /// For a leaf, the next node.
     pub after: u32,
 }
 
@@ -55,11 +55,11 @@ pub fn children(nodes: &[TreeNode], node: usize) -> impl Iterator<Item = usize> 
 /// Open subtrees kept without the heap: enough for any balanced tree.
 pub const NEAR: usize = 48;
 
-/// Open nodes of a traversal.
+/// Stack of open nodes of a traversal.
 pub struct Stack<T = u32> {
     pub near: [T; NEAR],
     pub used: usize,
-    /// Deeper levels of degenerate trees.
+    /// Overflow for degenerate trees.
     pub far: Vec<T>,
 }
 

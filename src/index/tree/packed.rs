@@ -13,8 +13,8 @@ use crate::query::ItemId;
 
 /// A tree packed for queries.
 ///
-/// 28 bytes per item; nodes have at most sixteen children, and 110 to 160 bytes each
-/// with their blocks of sixteen.
+/// 28 bytes per item. Nodes have at most sixteen children and take 110 to 160 bytes each, blocks of
+/// sixteen included.
 #[derive(Default)]
 pub struct PackedTree {
     /// In depth-first order.
@@ -28,20 +28,18 @@ pub struct PackedTree {
     positions: Positions,
     /// The leaf of each position, from the first refit on.
     leaves: Vec<u32>,
-    /// The parent of each node, from the first refit on; the root's is the root.
+    /// The parent of each node, from the first refit on; the root is its own parent.
     parents: Vec<u32>,
 }
 
 impl PackedTree {
     /// Builds a tree in depth-first order from the group of its root.
     ///
-    /// `expand` is called once per node with the tree so far, the node's index and its
-    /// group: it either [pushes](PackedTree::push) the items of a leaf or lists the
-    /// groups of the children, in order. Iterative, so that a degenerate tree cannot
-    /// overflow the stack.
+    /// `expand` is called once per node with the tree so far, the node's index and its group: it
+    /// either [pushes](PackedTree::push) the items of a leaf or lists the groups of the children,
+    /// in order. Iterative, so that a degenerate tree cannot overflow the stack.
     ///
-    /// # Panics
-    /// If a node has more than sixteen children.
+    /// # Panics If a node has more than sixteen children.
     pub fn grow<G>(
         items: usize,
         root: G,
@@ -111,12 +109,12 @@ impl PackedTree {
         &self.ids
     }
 
-    /// The root, and the lanes of the wide nodes below it.
+    /// The root, followed by the lanes of the wide nodes below it.
     pub fn cells(&self) -> Vec<TreeCell<'_>> {
         let mut cells = Vec::new();
         let below = (!self.wide_nodes.blocks.is_empty()).then_some(0);
         let root = self.nodes.first();
-        // The last entry is the next cell; one without a wide node below it keeps items.
+        // The last entry is the next cell; a cell without a wide node below it keeps items.
         let mut open = Vec::from_iter(root.map(|root| (0, root.bounds, root.items(), below)));
         while let Some((level, bounds, items, below)) = open.pop() {
             cells.push(TreeCell {
@@ -149,8 +147,8 @@ impl PackedTree {
 
     /// Takes over the new bounds of moved items: refits the nodes above them.
     ///
-    /// The tree's shape does not change. False, with the tree unchanged, if an item enters
-    /// or leaves the tree (it is or was empty).
+    /// The tree's shape does not change. False, with the tree unchanged, if an item becomes or
+    /// ceases to be empty.
     ///
     /// Calls `fitted` for every node that changed, children first. O(moved * depth).
     pub fn refit(
@@ -192,7 +190,7 @@ impl PackedTree {
         true
     }
 
-    /// Finds the ways from items to the root.
+    /// Computes the leaf of each position and the parent of each node.
     fn find_paths(&mut self) {
         self.leaves.resize(self.ids.len(), 0);
         self.parents.resize(self.nodes.len(), 0);
@@ -228,7 +226,7 @@ mod tests {
     use crate::query::{Count, NoRecorder, QueryContext};
     use glam::Vec3;
 
-    /// A degenerate tree: each node has one leaf and the rest.
+    /// A degenerate tree: each node has a leaf and the remaining items as children.
     fn comb(items: &[Aabb]) -> PackedTree {
         enum Group {
             Rest(usize),

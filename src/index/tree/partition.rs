@@ -1,7 +1,7 @@
 //! Top-down construction, shared by octree, quadtree and BSP tree.
 //!
-//! The order of work, the leaves, and the fallback for groups that cannot be divided. A
-//! splitter decides how a group of items is divided.
+//! Order of work, leaves, and the fallback for groups that cannot be divided. A splitter decides
+//! how a group of items is divided.
 
 use super::packed::PackedTree;
 use crate::index::items::Record;
@@ -13,7 +13,7 @@ pub struct Part<C> {
     pub items: usize,
     /// State that the splitter gets back with the part.
     ///
-    /// `None` for a part that the splitter does not divide further.
+    /// `None` for a part that is not divided further by the splitter.
     pub cell: Option<C>,
 }
 
@@ -24,9 +24,9 @@ pub trait Splitter {
 
     /// Reorders the records so that the parts are contiguous, and pushes the parts.
     ///
-    /// At most sixteen, which add up to the records; more make the build panic.
-    /// No part, or a single one, means that the group cannot be divided in this
-    /// way. `node` is the index of the group's node.
+    /// At most sixteen parts, whose items add up to the records; more make the build panic. No
+    /// part, or a single one, means that the group cannot be divided in this way. `node` is the
+    /// index of the group's node.
     fn split(
         &mut self,
         records: &mut [Record],
@@ -39,11 +39,10 @@ pub trait Splitter {
     fn arrange(&mut self, _records: &mut [Record]) {}
 }
 
-/// Builds a tree over items, with at most `leaf` items per leaf, and at least one.
+/// Builds a tree over items, with 1 to `leaf` items per leaf.
 ///
-/// Groups that the splitter cannot divide (coincident items, say) are halved
-/// by size, so that no leaf exceeds its limit and the depth stays bounded.
-/// O(n log n) for splitters that divide evenly.
+/// Groups that the splitter cannot divide (coincident items, say) are halved by size, so that no
+/// leaf exceeds its limit and the depth stays bounded. O(n log n) for splitters that divide evenly.
 pub fn build_top_down<S: Splitter>(
     mut records: Vec<Record>,
     leaf: usize,

@@ -1,7 +1,7 @@
 //! Queries of the packed tree, the same for every builder.
 //!
-//! [`PackedTree::query`] descends level by level through the wide nodes for a volume and
-//! calls [`PackedTree::locate`] for a point, one pass along the nodes in memory order.
+//! [`PackedTree::query`] descends level by level through the wide nodes for a volume; for a point
+//! it calls [`PackedTree::locate`], one pass along the nodes in memory order.
 
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
@@ -36,8 +36,8 @@ thread_local! {
 impl PackedTree {
     /// Passes every item that the volume sees to the sink.
     ///
-    /// Items that hold a point in tree order; items of a frustum by level, accepted
-    /// subtrees first, then the tested items of leaves.
+    /// Items that hold a point come in tree order; items of a frustum by level, accepted subtrees
+    /// first, then the tested items of leaves.
     #[inline(always)]
     pub fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if !Q::IS_POINT {
@@ -75,8 +75,9 @@ impl PackedTree {
         flow
     }
 
-    /// Passes accepted subtrees to the sink and collects the leaves that straddle
-    /// a plane. The root straddles the planes of `mask`.
+    /// Passes accepted subtrees to the sink and collects the straddling leaves.
+    ///
+    /// The root straddles the planes of `mask`.
     #[inline(always)]
     fn search_wide_nodes<Q: QueryVolume, C: Context>(
         &self,
@@ -165,7 +166,7 @@ impl PackedTree {
         ControlFlow::Continue(())
     }
 
-    /// Prefetches the items of a leaf, whose node is in the cache by now.
+    /// Prefetches the items of a leaf, whose node has arrived in the cache.
     #[inline(always)]
     fn prefetch_tests<Q: QueryVolume>(
         &self,
@@ -184,7 +185,7 @@ impl PackedTree {
 
     /// Passes every item whose closed box holds `p` to the sink, in tree order.
     ///
-    /// One pass over the nodes in memory order, which jumps over rejected subtrees.
+    /// One pass over the nodes in memory order, which skips rejected subtrees.
     #[inline(always)]
     fn locate<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
         let nodes = self.nodes();

@@ -1,6 +1,6 @@
 //! Region search by dividing planes of any direction.
 //!
-//! One per inner node of a binary tree, and one dot product each.
+//! One plane per inner node of a binary tree, one dot product each.
 
 use std::ops::ControlFlow;
 
@@ -11,18 +11,18 @@ use super::packed::PackedTree;
 use crate::geometry::Plane;
 use crate::query::{Context, Predicate, Recorder};
 
-/// The direction of a node's plane and how far its two sides reach along it.
+/// The normal of a node's plane and how far its two sides reach along it.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Split {
     normal: Vec3,
-    /// Nothing on the back side reaches farther than this along the normal.
+    /// Greatest position of the back side along the normal.
     back_high: f32,
-    /// Nothing on the front side reaches back beyond this.
+    /// Least position of the front side along the normal.
     front_low: f32,
 }
 
 impl Split {
-    /// The splits of a tree by the normal of each node; those of leaves are unused.
+    /// The splits of a tree by the normals of its nodes; those of leaves are unused.
     pub fn all(tree: &PackedTree, normals: Vec<Vec3>) -> Vec<Split> {
         let fitted = |(node, normal)| {
             let mut split = Split {
@@ -47,8 +47,9 @@ impl Split {
         self.front_low = along.value_at(along.n_vertex(&front.bounds));
     }
 
-    /// Position along the normal, by the plane test's own arithmetic: being
-    /// monotone, it never puts a point of an item beyond the item's corner.
+    /// Position along the normal, by the plane test's own arithmetic.
+    ///
+    /// Monotone: a point of an item never lies beyond the item's corner.
     #[inline(always)]
     fn along(&self) -> Plane {
         Plane::new(self.normal, 0.0)
@@ -77,7 +78,7 @@ pub fn locate<C: Context>(
             let split = &splits[at];
             let value = split.along().value_at(p);
             let front = nodes[at + 1].after();
-            // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
+            // Not `<=`: with a NaN (coordinates beyond f32) both sides are entered.
             let beyond_back = value > split.back_high;
             let before_front = value < split.front_low;
             at = match (beyond_back, before_front) {

@@ -1,7 +1,7 @@
 //! Cost of a recorder that is off.
 //!
-//! Region searches with `NoRecorder` (`by_library`), and by a copy of the search without that
-//! parameter (`by_hand`). `scripts/check-recorder.sh` compares the instructions of the two.
+//! Region search with `NoRecorder` (`by_library`), and a copy of the search without that parameter
+//! (`by_hand`). `scripts/check-recorder.sh` compares the instructions of the two.
 
 use std::hint::black_box;
 

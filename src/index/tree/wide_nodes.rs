@@ -1,6 +1,6 @@
-//! The nodes of a tree grouped sixteen to a block.
+//! The nodes of a tree grouped sixteen to a block: layout, construction and refit.
 //!
-//! A query by a volume tests sixteen nodes at once. Layout, construction and refit.
+//! A query by a volume tests sixteen nodes at once.
 
 use std::collections::VecDeque;
 
@@ -26,24 +26,24 @@ pub struct Links {
 
 /// A tree of wide nodes: sixteen lanes each, in tree order.
 ///
-/// The lanes are any descendants of one tree node. 40 bytes per lane.
+/// The lanes of a wide node are any descendants of one tree node. 40 bytes per lane.
 #[derive(Default)]
 pub struct WideNodes {
     pub blocks: Vec<BoxBlock>,
     pub links: Vec<Links>,
-    /// The lane of each tree node, counted over all wide nodes; or [`NO_LANE`].
+    /// The lane of each tree node, numbered over all wide nodes; or [`NO_LANE`].
     lane_of: Vec<u32>,
 }
 
-/// Mark of a tree node whose children take its place.
+/// Mark of a tree node that its children replace.
 const NO_LANE: u32 = u32::MAX;
 
 impl WideNodes {
     /// Groups the nodes of a tree in depth-first order.
     ///
-    /// Nodes are replaced by their children, the largest surface first, as long as they
-    /// fit: that node is the likeliest to straddle (Wald, Benthin and Boulos 2008, "Getting
-    /// rid of packets", p. 52). No wide node if the root is a leaf. O(nodes).
+    /// Nodes are replaced by their children, the largest surface first, as long as they fit: the
+    /// largest node is the likeliest to straddle (Wald, Benthin and Boulos 2008, "Getting rid of
+    /// packets", p. 52). No wide node if the root is a leaf. O(nodes).
     pub fn new(nodes: &[TreeNode]) -> WideNodes {
         let mut wide = WideNodes {
             lane_of: vec![NO_LANE; nodes.len()],
@@ -112,7 +112,7 @@ impl WideNodes {
     }
 }
 
-/// At most sixteen descendants that a node's block holds, in tree order.
+/// Descendants of a node that its block holds, at most sixteen, in tree order.
 fn lanes_of(nodes: &[TreeNode], parent: usize, scale: f32) -> impl Iterator<Item = usize> {
     let area = |node: usize| nodes[node].bounds.scaled(scale).half_area();
     let below = |node| children(nodes, node).map(|child| (area(child), child));
