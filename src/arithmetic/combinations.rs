@@ -1,10 +1,10 @@
-//! Choices of a few of many: the pairs, triples and quadruples of planes.
+//! Combinations: pairs, triples and quadruples of planes.
 
 /// All ascending choices of `N` numbers below `count`, in lexicographic order.
 pub fn combinations<const N: usize>(count: usize) -> impl Iterator<Item = [usize; N]> {
     let first = (N <= count).then(|| std::array::from_fn(|i| i));
     std::iter::successors(first, move |last: &[usize; N]| {
-        // The last number that can grow; those behind it follow it.
+        // The last number that can grow; those after it follow it.
         let at = (0..N).rfind(|&i| last[i] + N - i < count)?;
         let mut next = *last;
         for (number, i) in next[at..].iter_mut().zip(1..) {

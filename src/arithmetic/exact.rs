@@ -17,7 +17,7 @@ pub fn difference(a: DVec3, b: DVec3) -> ExactVector {
     [0, 1, 2].map(|k| &Expansion::from(a[k]) - &Expansion::from(b[k]))
 }
 
-/// Each component rounded to f64, but for an ulp.
+/// Each component rounded to f64, up to an ulp.
 pub fn estimate(v: &ExactVector) -> DVec3 {
     DVec3::new(v[0].estimate(), v[1].estimate(), v[2].estimate())
 }
@@ -62,16 +62,14 @@ pub fn pi() -> Expansion {
     Expansion::sum(TERMS)
 }
 
-/// Sum of `first factor^n / (d(1) d(2) ... d(n))` over all n from 0 on.
-///
-/// The result has `count` terms.
+/// Sum of `first factor^n / (d(1) d(2) ... d(n))` over n >= 0, to `count` terms.
 pub fn series(
     first: Expansion,
     factor: &Expansion,
     divisor: impl Fn(f64) -> f64,
     count: usize,
 ) -> Expansion {
-    // Below the last digit of one.
+    // Below the last digit of 1.
     let negligible = libm::exp2(-58.0 * count as f64);
     let (mut sum, mut term, mut n) = (first.clone(), first, 0.0);
     while term.estimate().abs() > negligible {

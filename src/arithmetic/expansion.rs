@@ -1,13 +1,14 @@
-//! Exact arithmetic on doubles: numbers as sums that do not overlap.
+//! Exact arithmetic on doubles: numbers as sums of non-overlapping terms.
 //!
 //! Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric
-//! predicates", Discrete & Computational Geometry 18, p. 305. Also precise arithmetic: the same
-//! sums cut to their leading terms.
+//! predicates", Discrete & Computational Geometry 18, p. 305. Truncated to their leading terms, the
+//! same sums are multiple-precision arithmetic.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// `a + b` as the rounded sum and what the rounding lost (Knuth, The Art of
-/// Computer Programming 2, 4.2.2, theorem B). Exact unless the sum overflows.
+/// `a + b` as the rounded sum and its rounding error.
+///
+/// Exact unless the sum overflows: Knuth, The Art of Computer Programming 2, 4.2.2, theorem B.
 #[inline(always)]
 pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -16,10 +17,10 @@ pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (sum, (a - virtual_a) + (b - virtual_b))
 }
 
-/// `a * b` as the rounded product and what the rounding lost (Dekker 1971).
+/// `a * b` as the rounded product and its rounding error (Dekker 1971).
 ///
-/// Exact while the product and its parts neither overflow nor underflow: for
-/// |a|, |b| below 2^995 and a product of zero or above 2^-960.
+/// Exact while the product and its parts neither overflow nor underflow: for |a|, |b| below 2^995
+/// and a product of zero or above 2^-960.
 #[inline]
 pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     // Veltkamp's splitting into 26 + 26 bits.
@@ -34,12 +35,12 @@ pub fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, rest)
 }
 
-/// A real number as an exact sum of doubles, smallest first, none zero, no two
-/// overlapping; no terms at all are zero.
+/// A real number as an exact sum of doubles.
 ///
-/// Sums and products are exact as long as no term overflows or underflows
-/// (products of up to five f32 values never do). [`Expansion::leading`] cuts a
-/// number to a few terms: floating-point arithmetic of about 50 bits a term.
+/// Terms ascend, are not zero and do not overlap; the number without terms is zero. Sums and
+/// products are exact as long as no term overflows or underflows (products of up to five f32 values
+/// never do). [`Expansion::leading`] truncates a number to a few terms: floating-point arithmetic
+/// of about 50 bits per term.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct Expansion {
     terms: Vec<f64>,
@@ -80,7 +81,7 @@ impl Expansion {
         &self.terms
     }
 
-    /// -1, 0 or 1: the largest term outweighs all others together.
+    /// The sign, -1, 0 or 1: the largest term outweighs all others together.
     pub fn sign(&self) -> i32 {
         match self.terms.last() {
             None => 0,
@@ -89,12 +90,12 @@ impl Expansion {
         }
     }
 
-    /// The nearest double but for an ulp.
+    /// The nearest double, up to an ulp.
     pub fn estimate(&self) -> f64 {
         self.terms.iter().sum()
     }
 
-    /// Times `2^exponent`: exact, but for terms that leave the range of f64.
+    /// Times `2^exponent`; exact, except for terms that leave the range of f64.
     pub fn scaled(&self, exponent: i32) -> Expansion {
         let scaled = self.terms.iter().map(|&term| libm::ldexp(term, exponent));
         Expansion {
@@ -102,9 +103,9 @@ impl Expansion {
         }
     }
 
-    /// Adds a double, exactly (GROW-EXPANSION with zeros left out).
+    /// Adds a double, exactly (GROW-EXPANSION with zeros omitted).
     pub fn grow(&mut self, value: f64) {
-        // Terms below half an ulp of the value stay as they are.
+        // Terms below half an ulp of the value are unchanged.
         const TWO_54: f64 = (1u64 << 54) as f64;
         let untouched = |term: &f64| term.abs() * TWO_54 < value.abs();
         let above = self.terms.iter().rev().position(untouched);
@@ -125,13 +126,14 @@ impl Expansion {
         }
     }
 
-    /// The same number in as few terms as possible, each the rounded sum of
-    /// itself and all below (COMPRESS).
+    /// The same number in as few terms as possible (COMPRESS).
+    ///
+    /// Each is the rounded sum of itself and all smaller ones.
     pub fn compressed(mut self) -> Expansion {
         let Some(mut top) = self.terms.pop() else {
             return self;
         };
-        // Downwards: the largest terms take up what they can.
+        // Downwards: the largest terms absorb as much as they can.
         let mut packed = Vec::with_capacity(self.terms.len() + 1);
         for &term in self.terms.iter().rev() {
             let (sum, lost) = two_sum(top, term);
@@ -143,7 +145,7 @@ impl Expansion {
             }
         }
         packed.push(top);
-        // Upwards: what is left slides together.
+        // Upwards: merges what remains.
         let mut terms = Vec::with_capacity(packed.len());
         let mut below = packed.pop().unwrap_or(0.0);
         while let Some(term) = packed.pop() {
@@ -159,8 +161,7 @@ impl Expansion {
         Expansion { terms }
     }
 
-    /// The number cut to its `count` leading terms: an error below 2^(-52 *
-    /// count) of it.
+    /// The `count` leading terms, with a relative error below 2^(-52 * count).
     pub fn leading(self, count: usize) -> Expansion {
         let mut cut = self.compressed();
         let surplus = cut.terms.len().saturating_sub(count);
@@ -173,12 +174,11 @@ impl Expansion {
         if self.sign() < 0 { -&self } else { self }
     }
 
-    /// `self / divisor` to `count` terms, by long division; `divisor` is not
-    /// zero.
+    /// `self / divisor` to `count` terms, by long division; `divisor` is not zero.
     pub fn over(&self, divisor: f64, count: usize) -> Expansion {
         let mut quotient = Expansion::ZERO;
         let mut rest = self.clone();
-        // Every digit leaves a rest some 2^-50 of what was left.
+        // Every digit reduces the remainder by a factor of about 2^-50.
         for _ in 0..=count {
             let digit = rest.estimate() / divisor;
             quotient.grow(digit);
@@ -193,7 +193,7 @@ impl Expansion {
     pub fn reciprocal(&self, count: usize) -> Expansion {
         let two = Expansion::from(2.0);
         let mut x = Expansion::from(1.0 / self.estimate());
-        // Each step doubles the bits that are right, from 50 on.
+        // Each step doubles the number of correct bits, from 50 on.
         for _ in 0..=count.ilog2() + 1 {
             let residual = (&two - &(self * &x)).leading(count + 1);
             x = (&x * &residual).leading(count + 1);
@@ -201,8 +201,9 @@ impl Expansion {
         x.leading(count)
     }
 
-    /// The square root to `count` terms, by Newton's iteration for `1/sqrt`;
-    /// of a positive number.
+    /// The square root of a non-negative number to `count` terms.
+    ///
+    /// Newton's iteration for `1/sqrt`.
     pub fn sqrt(&self, count: usize) -> Expansion {
         if self.sign() == 0 {
             return Expansion::ZERO;
@@ -253,7 +254,7 @@ impl Mul for &Expansion {
         let mut product = Expansion {
             terms: Vec::with_capacity(2 * a.len() * b.len()),
         };
-        // From small to large, as far as ranks tell: the sums stay short.
+        // Small to large, approximately by rank: the sums stay short.
         for rank in 0..(a.len() + b.len()).saturating_sub(1) {
             for i in (rank + 1).saturating_sub(b.len())..a.len().min(rank + 1) {
                 let (high, low) = two_product(a[i], b[rank - i]);
@@ -280,7 +281,7 @@ mod tests {
         (-(1i64 << 52)..1 << 52, 0..60).prop_map(|(m, shift)| m as f64 / (1u64 << shift) as f64)
     }
 
-    /// The value of the lowest bit that is set.
+    /// The value of the lowest set bit.
     fn lowest_bit(x: f64) -> f64 {
         let mantissa = x.to_bits() & ((1 << 52) - 1) | 1 << 52;
         libm::ldexp(1.0, libm::ilogb(x) - 52 + mantissa.trailing_zeros() as i32)

@@ -1,7 +1,7 @@
 //! Arithmetic with a known error, or none.
 //!
-//! Directed rounding, error-free sums and products, cross products without cancellation,
-//! and expansions (exact sums of doubles).
+//! Directed rounding, error-free sums and products, cross products without cancellation, and
+//! expansions (exact sums of doubles).
 
 mod combinations;
 mod cross;

@@ -1,4 +1,4 @@
-//! Directed rounding: differences and sums that stay bounds.
+//! Directed rounding: differences and sums as guaranteed bounds.
 
 use super::two_sum;
 
@@ -14,16 +14,16 @@ pub fn round_up(x: f64) -> f32 {
     }
 }
 
-/// `a - b` rounded down to f32, true to the exact difference.
+/// `a - b` rounded down to f32, correct for the exact difference.
 ///
-/// The f64 subtraction may itself have rounded up onto an f32 value; Knuth's
-/// TwoSum (The Art of Computer Programming 2, 4.2.2, theorem B) gives the
-/// part that was lost, and one step down repairs it.
+/// The f64 subtraction may itself have rounded up onto an f32 value; Knuth's TwoSum (The Art of
+/// Computer Programming 2, 4.2.2, theorem B) gives its rounding error, and one step down corrects
+/// it.
 pub fn difference_down(a: f64, b: f64) -> f32 {
     -difference_up(b, a)
 }
 
-/// `a - b` rounded up to f32, true to the exact difference.
+/// `a - b` rounded up to f32, correct for the exact difference.
 pub fn difference_up(a: f64, b: f64) -> f32 {
     let (sum, lost) = two_sum(a, -b);
     let rounded = round_up(sum);
@@ -34,14 +34,14 @@ pub fn difference_up(a: f64, b: f64) -> f32 {
     }
 }
 
-/// `a + b` rounded down to f64, true to the exact sum.
+/// `a + b` rounded down to f64, correct for the exact sum.
 pub fn sum_down(a: f64, b: f64) -> f64 {
-    // Not -sum_up(-a, -b): that would turn a zero into -0.
+    // Not -sum_up(-a, -b), which would turn a zero into -0.
     let (sum, lost) = two_sum(a, b);
     if lost < 0.0 { sum.next_down() } else { sum }
 }
 
-/// `a + b` rounded up to f64, true to the exact sum.
+/// `a + b` rounded up to f64, correct for the exact sum.
 pub fn sum_up(a: f64, b: f64) -> f64 {
     let (sum, lost) = two_sum(a, b);
     if lost > 0.0 { sum.next_up() } else { sum }

@@ -1,15 +1,16 @@
 //! Camera controls: slide, advance, zoom, orbit, yaw, pitch and roll.
 //!
-//! Angles are degrees, counter-clockwise about their axis (right-hand rule). Rotations
-//! correct their drift.
+//! Angles are degrees, counter-clockwise about their axis (right-hand rule). Rotations correct
+//! their own drift.
 
 use glam::{DQuat, DVec3};
 
 use super::frame::{check_finite, unit};
 use super::{Camera, CameraError, Frame, Lens, LensKind, Result, finite, require};
 
-/// Rotations between two corrections: a rotation drifts by about 2e-16, so
-/// the frame stays orthonormal to 1e-13 at no visible cost.
+/// Rotations between two corrections.
+///
+/// A rotation drifts by about 2e-16, so the frame stays orthonormal to 1e-13 at negligible cost.
 const CORRECT_EVERY: u32 = 100;
 
 /// Sine and cosine of degrees, through `libm`: the same on every platform.
@@ -76,8 +77,7 @@ impl Frame {
 
     /// Banks left for a positive angle: about n, `u' = cos u + sin v`.
     ///
-    /// This is the sign of the lecture's formula; its program text has the
-    /// other one.
+    /// This is the sign of the lecture's formula; its program listing has the opposite one.
     pub fn roll(&mut self, degrees: f64) {
         let (sin, cos) = sin_cos(degrees);
         (self.u, self.v) = (self.u * cos + self.v * sin, self.v * cos - self.u * sin);
@@ -86,11 +86,10 @@ impl Frame {
 
     /// Swings the whole camera about `centre`.
     ///
-    /// First by `around` degrees about `axis` (through the centre), then by `over` degrees
-    /// about its own u. Distance and bearing to the centre stay.
+    /// First by `around` degrees about `axis` (through the centre), then by `over` degrees about
+    /// the camera's own u. Keeps distance and bearing to the centre.
     ///
-    /// # Errors
-    /// An axis of length zero, or a value that is not finite; the frame is unchanged.
+    /// # Errors An axis of length zero, or a value that is not finite; the frame is unchanged.
     pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
         let found = format_args!("the axis of the orbit is zero or not finite");
         let is_direction = axis.is_finite() && axis != DVec3::ZERO;
@@ -99,7 +98,7 @@ impl Frame {
         finite("the angle around", around)?;
         finite("the angle over", over)?;
         self.swing(centre, unit(axis), around);
-        // Read only now: the first swing has turned u.
+        // Read u only now: the first swing has turned it.
         self.swing(centre, self.u, over);
         Ok(())
     }

@@ -1,11 +1,11 @@
-//! The camera's orthonormal frame in f64, and its pose as written.
+//! The camera's orthonormal frame in f64, and the pose it was made from.
 
 use glam::{DMat3, DVec3};
 
 use super::{Camera, CameraError, Result, require};
 use crate::arithmetic::exact::{self, ExactVector};
 
-/// Position and direction of a camera; the numbers as written count as exact.
+/// Position and direction of a camera; the numbers are exact as written.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pose {
     /// From the eye to a point.
@@ -28,8 +28,9 @@ pub enum Pose {
     },
 }
 
-/// The sine of the least angle between up and the direction of view, 4 units
-/// of 2^-52: an up that was computed to be parallel is no nearer to it.
+/// Sine of the least angle between up and the direction of view.
+///
+/// 4 units of 2^-52: covers an up vector that was computed to be parallel.
 const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
 impl Pose {
@@ -40,12 +41,13 @@ impl Pose {
         }
     }
 
-    /// The direction of view without any rounding, but for a power of two; its
-    /// largest component is near 1. `None` for zero.
+    /// The direction of view, exact up to a power of two; `None` for zero.
+    ///
+    /// The largest component is near 1.
     pub(crate) fn direction(&self) -> Option<ExactVector> {
         exact::near_unit(match *self {
             Pose::Forward { forward, .. } => exact::vector(forward),
-            // Quartered where the difference could overflow.
+            // Quartered if the difference could overflow.
             Pose::LookAt { eye, look, .. } if eye.abs().max(look.abs()).max_element() > 1e300 => {
                 exact::difference(look / 4.0, eye / 4.0)
             }
@@ -53,11 +55,11 @@ impl Pose {
         })
     }
 
-    /// The axes u and n, true to some units of 2^-53 however near up is to the
-    /// direction of view, and look to the eye: the cross product is exact.
+    /// The axes u and n, true to some units of 2^-53.
     ///
-    /// # Errors
-    /// The errors of [`look_at`].
+    /// However near up is to the direction of view and look to the eye: the cross product is exact.
+    ///
+    /// # Errors The errors of [`look_at`].
     pub(super) fn axes(&self) -> Result<[DVec3; 2]> {
         let (eye, name, towards, up) = match *self {
             Pose::LookAt { eye, look, up } => (eye, "look", look, up),
@@ -78,7 +80,7 @@ impl Pose {
             CameraError::invalid(found, "an up vector that is neither")
         };
         let up = exact::near_unit(exact::vector(up)).ok_or_else(parallel)?;
-        // up x n, but for its length.
+        // up x n, not normalised.
         let across = exact::cross(&forward, &up);
         let length = |v: &ExactVector| exact::estimate(v).length();
         let sine = length(&across) / (length(&forward) * length(&up));
@@ -92,7 +94,7 @@ impl Pose {
 
 /// Unit vector along `v`, for any length above 0.
 pub(super) fn unit(v: DVec3) -> DVec3 {
-    // Twice: 1/largest alone overflows for subnormal lengths.
+    // Twice: 1/largest alone overflows for subnormal vectors.
     let scaled = v / v.abs().max_element();
     scaled / scaled.length()
 }
@@ -107,12 +109,11 @@ pub(super) fn check_finite(name: &str, v: DVec3) -> Result<()> {
 
 /// Position and orientation of a camera.
 ///
-/// Eye position and the unit vectors u (right), v (up) and n (backward: the camera looks
-/// along -n). Right-handed: `u x v = n`.
+/// Eye position and the unit vectors u (right), v (up) and n (backward: the camera looks along -n).
+/// Right-handed: `u x v = n`.
 ///
-/// From "3D Viewing and Camera Control" (E. Agu, CS 543), with the lecture's
-/// names. Turned or moved by a number that is not finite, the frame has no view:
-/// [`Camera::volume`] refuses it.
+/// From "3D Viewing and Camera Control" (E. Agu, CS 543), with the lecture's names. A frame turned
+/// or moved by a number that is not finite has no view: [`Camera::volume`] refuses it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Frame {
     /// Position of the camera in world coordinates.
@@ -122,7 +123,7 @@ pub struct Frame {
     pub(super) n: DVec3,
     /// Rotations since the last correction, see `controls`.
     pub(super) rotations: u32,
-    /// Pose that the frame was made of, until it is turned.
+    /// Pose that the frame was made from, until the frame is turned.
     pub(super) written: Option<Pose>,
 }
 
@@ -130,22 +131,20 @@ pub struct Frame {
 ///
 /// `n = (eye - look)/|eye - look|`, `u = (up x n)/|up x n|`, `v = n x u`.
 ///
-/// The difference and the cross product are exact: the axes are true to some
-/// units of 2^-53 however near `up` is to the direction of view and `look` to
-/// the eye. Vectors are scaled before they are squared, so lengths from 1e-300
-/// to 1e300 work.
+/// The difference and the cross product are exact: the axes are true to some units of 2^-53 however
+/// near `up` is to the direction of view and `look` to the eye. Vectors are scaled before they are
+/// squared, so lengths from 1e-300 to 1e300 work.
 ///
-/// # Errors
-/// A value that is not finite, `eye == look`, `up` zero or parallel to the
-/// direction of view, or within 9e-16 rad of it.
+/// # Errors A value that is not finite, `eye == look`, `up` zero or within 9e-16 rad of the
+/// direction of view or its opposite.
 pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame> {
     Pose::LookAt { eye, look, up }.frame()
 }
 
 impl Pose {
-    /// The numbers that the camera's frame was made of.
+    /// The pose that the camera's frame was made from.
     ///
-    /// After a turn or a move: the frame's own eye, direction and up.
+    /// After a turn or a move: the frame's current eye, direction and up.
     pub fn of(camera: &Camera) -> Pose {
         let frame = &camera.frame;
         match frame.written {
@@ -172,7 +171,7 @@ impl Pose {
             rotations: 0,
             written: None,
         };
-        // The last digit or two of orthogonality.
+        // Corrects the last digit or two of orthogonality.
         frame.orthonormalise();
         frame.written = Some(*self);
         Ok(frame)
@@ -182,8 +181,7 @@ impl Pose {
 impl Frame {
     /// The frame at `eye` that looks along `forward`.
     ///
-    /// # Errors
-    /// The errors of [`look_at`], but for `forward` zero.
+    /// # Errors The errors of [`look_at`]; `forward` zero in place of `eye == look`.
     pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame> {
         Pose::Forward { eye, forward, up }.frame()
     }
@@ -208,7 +206,7 @@ impl Frame {
         -self.n
     }
 
-    /// The same frame seen from another origin.
+    /// The same frame relative to another origin.
     pub fn relative_to(&self, origin: DVec3) -> Frame {
         let eye = self.eye - origin;
         Frame { eye, ..*self }
@@ -240,9 +238,9 @@ mod tests {
             errors.into_iter().fold(0.0, f64::max)
         }
 
-        /// This frame with the axes of another but its own pose as written.
+        /// This frame with the axes of another one but its own written pose.
         ///
-        /// Wrong on purpose, for tests of what notices it.
+        /// Wrong on purpose, for tests of the checks that must notice it.
         pub fn with_axes_of(self, other: &Frame) -> Frame {
             let (u, v, n) = (other.u, other.v, other.n);
             Frame { u, v, n, ..self }

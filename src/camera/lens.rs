@@ -1,6 +1,6 @@
 //! Lenses: perspective, orthographic, off-axis and matrices.
 //!
-//! Each has a near plane and a finite or (but for orthographic) infinite far plane.
+//! Each has a near plane and a far plane, which may be infinite except for orthographic lenses.
 
 use std::cmp::Ordering;
 
@@ -43,7 +43,7 @@ pub enum LensKind {
     },
     /// The whole camera as a matrix, see [`Camera::of_matrix`].
     ///
-    /// The frame does not affect what is visible.
+    /// The frame does not affect visibility.
     ///
     /// [`Camera::of_matrix`]: super::Camera::of_matrix
     Matrix(ViewProjection),
@@ -52,12 +52,11 @@ pub enum LensKind {
 impl Lens {
     /// A lens by its full vertical angle in degrees and width / height.
     ///
-    /// Without `far` what is visible has no end.
+    /// Without `far` the view volume is infinite.
     ///
-    /// # Errors
-    /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or beyond
-    /// 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] is an
-    /// infinite one.
+    /// # Errors fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or beyond
+    /// 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] counts as
+    /// infinite.
     pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
@@ -82,8 +81,8 @@ impl Lens {
 
     /// A lens of any kind but a matrix.
     ///
-    /// # Errors
-    /// Those of the kind's constructor; an orthographic lens without far plane; a matrix.
+    /// # Errors The errors of the kind's constructor; an orthographic lens without far plane; a
+    /// matrix.
     pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens> {
         match kind {
             LensKind::Perspective { fovy_deg, aspect } => {
@@ -127,7 +126,7 @@ impl Lens {
         &self.kind
     }
 
-    /// The matrix, where that stands for a lens.
+    /// The matrix, if that is the lens.
     pub fn matrix(&self) -> Option<&ViewProjection> {
         match &self.kind {
             LensKind::Matrix(matrix) => Some(matrix),
@@ -157,7 +156,7 @@ impl Lens {
     /// Left, right, bottom and top of the window.
     ///
     /// Slopes (offset per unit of depth) for a lens with a centre, plain offsets for an
-    /// orthographic one. A matrix need not have any: its planes and corners are its own.
+    /// orthographic one. Unspecified for a matrix, which has planes and corners instead.
     pub fn window(&self) -> [f64; 4] {
         let (y, aspect) = match self.kind {
             LensKind::Perspective { fovy_deg, aspect } => (slope(fovy_deg), aspect),
@@ -196,7 +195,7 @@ impl Lens {
         ends.concat().try_into().ok()
     }
 
-    /// The four corners of what is seen at a depth: bit 0 is right, bit 1 top.
+    /// The four corners of the view volume at a depth: bit 0 is right, bit 1 top.
     pub(super) fn corners_at(&self, frame: &Frame, depth: f64) -> [DVec3; 4] {
         let [left, right, bottom, top] = self.window();
         let reach = if self.is_orthographic() { 1.0 } else { depth };
@@ -208,19 +207,20 @@ impl Lens {
     }
 }
 
-/// The tangent of half an angle in degrees, true to some units of 2^-53 up to
-/// 180 degrees: near there what is missing is small, and its difference exact. 1 at 90.
+/// The tangent of half an angle in degrees, true to some units of 2^-53; 1 at 90.
+///
+/// Also near 180 degrees, where the angle's difference from 180 is small and exact.
 fn slope(degrees: f64) -> f64 {
     let below = |degrees: f64| libm::tan(degrees.to_radians() / 2.0);
     match degrees.total_cmp(&90.0) {
         Ordering::Less => below(degrees),
-        // The tangent of the rounded angle is not.
+        // The tangent of the rounded angle is not exactly 1.
         Ordering::Equal => 1.0,
         Ordering::Greater => 1.0 / below(180.0 - degrees),
     }
 }
 
-/// Sizes whose products of four neither overflow nor underflow in the oracle.
+/// Sizes for which products of four neither overflow nor underflow in the oracle.
 const EXACT: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
 fn check_aspect(aspect: f64) -> Result<()> {
@@ -228,7 +228,10 @@ fn check_aspect(aspect: f64) -> Result<()> {
     require(EXACT.contains(&aspect), found, "1e-100 to 1e100")
 }
 
-/// Sides of a window: of rays in units of near, which their directions depend on.
+/// Checks two sides of a window.
+///
+/// Sizes are relative to `unit`: for a lens with rays near, since ray directions depend on their
+/// quotient.
 fn check_window(name: &str, [low, high]: [f64; 2], unit: f64) -> Result<()> {
     finite(name, low)?;
     finite(name, high)?;
@@ -244,12 +247,11 @@ fn check_window(name: &str, [low, high]: [f64; 2], unit: f64) -> Result<()> {
 impl Camera {
     /// The camera of a view-projection matrix.
     ///
-    /// The matrix is its lens. The frame has the position of the eye (the centre of the
-    /// near plane if the matrix is orthographic) and the direction of view; turning or
-    /// moving it does not change what is visible.
+    /// The matrix is its lens. The frame has the position of the eye (the centre of the near plane
+    /// if the matrix is orthographic) and the direction of view; turning or moving it does not
+    /// change visibility.
     ///
-    /// # Errors
-    /// The errors of [`ViewProjection::new`].
+    /// # Errors The errors of [`ViewProjection::new`].
     pub fn of_matrix(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<Camera> {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
@@ -269,7 +271,7 @@ impl Camera {
 mod tests {
     use super::*;
 
-    /// The second row nearly along the fourth: as an up vector it would be refused.
+    /// The second row is nearly parallel to the fourth: refused as an up vector.
     #[test]
     fn a_matrix_needs_no_up() {
         for up in [1.0, 1e-14, 1e-16, 1e-20, 1e-60] {
@@ -287,8 +289,8 @@ mod tests {
 
     #[test]
     fn slopes_keep_their_digits_up_to_180_degrees() {
-        // 180 less 2^-40 degrees: the tangent is 2 / (2^-40 pi/180) but for a
-        // part of 1e-27.
+        // 180 minus 2^-40 degrees: the tangent is 2 / (2^-40 pi/180), up to a relative error of
+        // 1e-27.
         let missing = libm::exp2(-40.0);
         let true_slope = 2.0 / (missing * (std::f64::consts::PI / 180.0));
         let off = slope(180.0 - missing) / true_slope - 1.0;
@@ -297,7 +299,7 @@ mod tests {
         assert_eq!(slope(90.0), 1.0);
     }
 
-    /// Engines write the largest f32 for no far plane.
+    /// Engines write the largest f32 if there is no far plane.
     #[test]
     fn a_far_plane_beyond_f32_is_none() {
         let largest = f64::from(f32::MAX);

@@ -1,6 +1,6 @@
 //! The conservative epsilon, and the range of the sums of the plane test.
 //!
-//! Planes move outward so far that no visible box is lost: docs/NUMERICS.md has the proof.
+//! Planes move outward far enough that no visible box is lost; proof in docs/NUMERICS.md.
 
 use glam::DVec3;
 
@@ -8,53 +8,55 @@ use super::{Camera, CameraError, Frame, Result, require};
 use crate::arithmetic::rounding::round_up;
 use crate::geometry::{ConvexVolume, FrustumPlane, Plane, PlaneF64};
 
-/// u of f32.
+/// Unit roundoff of f32.
 const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
 
-/// Below half the smallest subnormal f32 times four: covers underflow.
+/// Covers underflow: below four times half the smallest subnormal f32.
 pub(super) const TINY: f64 = f64::from_bits((1023 - 147) << 52);
 
-/// The derivation in f64: each component of an axis is true to 4 units of
-/// 2^-53, a normal to 8, and the offset is a sum of products with the eye. 16
-/// units of what they are multiplied with cover all of it: at a point x of
-/// `reach`, 8 units of x, and of the eye 8, 3 for the sum and 2 for its own rounding.
+/// Relative error of the derivation in f64: 16 units of 2^-53.
 ///
-/// Depths of near and far and windows of orthographic lenses do not count, though
-/// offsets of such planes round them twice. At a distance D from the plane such a
-/// length is at most `|x|` + `|eye|` + D. Two units of the former fit into the 16, as
-/// the normal is an axis with 4; those of D are far less than D itself, which
-/// comes on top of what x evaluates to.
+/// Each component of an axis is true to 4 units, of a normal to 8; the offset is a sum of products
+/// with the eye. At a point x of `reach` that is 8 units of `|x|`, and of `|eye|` 8, 3 for the sum
+/// and 2 for the rounding of the eye itself.
+///
+/// Depths of near and far and windows of orthographic lenses need no share, though offsets of such
+/// planes round them twice. At a distance D from the plane such a length is at most `|x|` + `|eye|`
+/// + D. Two units of `|x|` + `|eye|` fit into the 16, as the normal is an axis with 4; two units of
+/// D are far less than D itself, which is added to the value at x.
 const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 
-/// Sums of the plane test must stay below this: half the largest f32, because
-/// a node's bounds may be wider than its items'.
+/// Upper bound of the sums of the plane test: half the largest f32.
+///
+/// Half, because a node's bounds may be wider than its items'.
 const LARGEST_SUM: f64 = (f32::MAX / 2.0) as f64;
 
-/// Points and bounds that the margins of one volume's planes depend on.
+/// Points and bounds that determine the margins of a volume's planes.
 pub(super) struct Margin {
     c: f64,
-    /// Largest absolute coordinates of the points that can be visible: those of
-    /// the volume and of the scene, whichever are smaller.
+    /// Largest absolute coordinates of the points that can be visible.
+    ///
+    /// Those of the volume or of the scene, whichever are smaller.
     pub(super) reach: DVec3,
     /// Near corners, then far ones.
     ///
-    /// A view without an end has no far ones; those of a matrix then are zero.
+    /// An infinite view has no far corners, and for a matrix its near ones are zero.
     near: [DVec3; 4],
     far: Option<[DVec3; 4]>,
-    /// How far the near plane's and the far plane's inner sides lie apart.
+    /// Distance between the near and the far plane.
     depth: f64,
-    /// The near corners' rays at unit depth, if there is no far plane.
+    /// Rays through the near corners at unit depth, if there is no far plane.
     rays: [DVec3; 4],
-    /// The share of the derivation in f64.
+    /// Error of the derivation in f64.
     ///
-    /// The named planes first, then those that are made about the rounded eye.
+    /// For the named planes; for planes made about the rounded eye.
     derived: [f64; 2],
-    /// True if the near and the far plane are known as exactly as from a frame.
+    /// True if near and far planes are as accurate as those of a frame.
     of_frame: bool,
 }
 
 impl Camera {
-    /// The frame about the sum of some points, one after the other.
+    /// The frame relative to the sum of some points, subtracted one by one.
     pub(super) fn frame_about(&self, zero: &[DVec3]) -> Frame {
         let moved = |frame: Frame, zero: &DVec3| frame.relative_to(*zero);
         zero.iter().fold(self.frame, moved)
@@ -62,12 +64,11 @@ impl Camera {
 }
 
 impl Margin {
-    /// Coordinates are about the sum of the points `zero`, those of the frame too.
+    /// Margins for coordinates, the frame's included, relative to the sum of `zero`.
     ///
-    /// `of_scene` is the scene's reach in them, zero if it is not known.
+    /// `of_scene` is the scene's reach in these coordinates, zero if unknown.
     ///
-    /// # Errors
-    /// An epsilon or a reach without a guarantee.
+    /// # Errors An epsilon or a reach for which nothing is guaranteed.
     pub(super) fn new(
         camera: &Camera,
         zero: &[DVec3],
@@ -96,12 +97,12 @@ impl Margin {
         let reach = reach(&near, far.as_ref(), of_scene);
         let mut derived = DERIVED * (reach + frame.eye.abs()).element_sum();
         if lens.is_orthographic() {
-            // Rays of samples begin at points that are rounded in the world.
+            // Rays of samples start at points that are rounded in world coordinates.
             let eye = zero.iter().sum::<DVec3>() + frame.eye;
             derived += f64::EPSILON * eye.abs().element_sum();
         }
-        // The planes of a matrix are rounded sums about the exact zero. Components of their
-        // normals that are subnormal in f32 are no less rounded than others.
+        // The planes of a matrix are exact sums relative to the exact origin, rounded once: only
+        // components of normals that are subnormal in f32 add an error.
         let underflow = reach.element_sum() * TINY;
         let of_named = lens.matrix().map_or(derived, |_| underflow);
         Ok(Margin {
@@ -118,7 +119,7 @@ impl Margin {
 
     /// Named planes and further ones as one volume.
     ///
-    /// They are moved outward if there is an epsilon. `reach` bounds the coordinates of the boxes that it is for.
+    /// With an epsilon they are moved outward. `reach` bounds the coordinates of the boxes to test.
     pub(super) fn volume(
         &self,
         named: &[(FrustumPlane, Plane)],
@@ -150,13 +151,11 @@ impl Margin {
         Plane::new(plane.normal, round_up(d + (error + TINY + derived + slack)))
     }
 
-    /// The largest sum of magnitudes at a visible point that the plane could
-    /// misjudge.
+    /// Largest sum of magnitudes at a visible point that the plane could misjudge.
     ///
-    /// The error at x is at most c*u times its sum of magnitudes, which is
-    /// convex in x; its distance from the plane is linear. Their difference is
-    /// therefore largest at a corner, and corners across the volume are too far
-    /// away to matter.
+    /// The error at x is at most c*u times its sum of magnitudes, which is convex in x; the
+    /// distance from the plane is linear. Their difference is therefore largest at a corner;
+    /// corners on the far side of the volume are too distant to matter.
     fn size(&self, name: Option<FrustumPlane>, plane: &Plane) -> f64 {
         let n = plane.normal.as_dvec3().abs();
         let d = f64::from(plane.d).abs();
@@ -174,7 +173,7 @@ impl Margin {
                 _ => loose,
             };
         };
-        // Half of the depth leaves room for its own rounding.
+        // Half of the depth: the other half is for its own rounding.
         let across = self.depth * 0.5 / unit;
         let (near, far) = (largest(&self.near), largest(far));
         let own = match name {
@@ -197,10 +196,9 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
     }
 }
 
-/// Returns whether no sum of the plane test can overflow for boxes within `reach`.
+/// Checks that no sum of the plane test can overflow for boxes within `reach`.
 ///
-/// # Errors
-/// The largest sum there may be, if not.
+/// # Errors The largest possible sum, if one can.
 pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<()> {
     let sums = volume.planes().iter().map(|p| largest_sum(p, reach));
     let largest = sums.fold(0.0, f64::max);
@@ -212,7 +210,7 @@ pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<()> {
 
 /// Largest sum of the magnitudes in a plane test within `reach`.
 ///
-/// NaN for a plane that holds one.
+/// NaN for a plane with a NaN.
 fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
     plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs()
 }
@@ -255,7 +253,7 @@ mod tests {
         for bad in [f32::NAN, -1.0, f32::INFINITY] {
             let error = refused(bad.into(), Vec3::ONE);
             assert!(matches!(error, Some(CameraError::Invalid { .. })), "{bad}");
-            // Boxes of more than f32 holds: sums that overflow.
+            // Boxes beyond the range of f32: sums that overflow.
             let error = refused(8.0, Vec3::new(1.0, bad, 1.0));
             let is_sum = matches!(error, Some(CameraError::Sums { .. }));
             assert!(error.is_some() && is_sum == (bad == f32::INFINITY), "{bad}");

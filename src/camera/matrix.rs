@@ -9,10 +9,10 @@ use crate::arithmetic::{Expansion, exact};
 use crate::geometry::{FrustumPlane, PlaneF64};
 
 named! {
-    /// How a matrix is to be read.
+    /// Reading of a matrix: order of entries and range of depth.
     ///
-    /// One with an eye tells itself whether depth is reversed, under either name: the plane
-    /// before the eye is near. Without an eye (orthographic) only the name does.
+    /// For a matrix with an eye reversed depth is detected, under either name: the plane in front
+    /// of the eye is near. For an orthographic one the name decides.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
     #[non_exhaustive]
     pub enum MatrixConvention, MATRIX_CONVENTIONS {
@@ -27,7 +27,7 @@ named! {
     }
 }
 
-/// Differences of conventions, as bits of their place in the table.
+/// Differences of conventions, as bits of their index in the table.
 const FROM_ZERO: usize = 1;
 const BY_ROWS: usize = 2;
 const REVERSED: usize = 4;
@@ -47,7 +47,7 @@ impl MatrixConvention {
         MatrixConvention::ALL[self as usize ^ REVERSED]
     }
 
-    /// The entries by this convention as those for column vectors, or the reverse.
+    /// Converts entries in this convention to those for column vectors, or back.
     pub(super) fn in_columns(self, entries: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
         match self.is(BY_ROWS) {
             false => entries,
@@ -56,23 +56,22 @@ impl MatrixConvention {
     }
 }
 
-/// The names of the entries: row, then column, as they are written down.
+/// The names of the entries, as written on paper: row, then column.
 pub const MATRIX_ENTRIES: [&str; 16] = [
     "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23", "m30",
     "m31", "m32", "m33",
 ];
 
-/// Products of four entries of these sizes neither overflow nor lose a digit.
+/// Entry sizes for which products of four neither overflow nor lose a digit.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
 
 /// Distance beyond which a far plane counts as infinite.
 ///
-/// Such a plane is none in f32, and engines write the largest f32 for none. Leaving it out
-/// returns more, never less.
+/// f32 has no such plane, and engines write the largest f32 if there is none. Omitting it returns
+/// more, never less.
 pub const FARTHEST: f64 = (f32::MAX / 2.0) as f64;
 
-/// Four numbers: a plane (normal and offset), or a point in homogeneous
-/// coordinates.
+/// A plane (normal and offset) or a point in homogeneous coordinates.
 type Four = [Expansion; 4];
 
 /// A view-projection matrix.
@@ -87,18 +86,19 @@ pub struct ViewProjection {
     pub(super) is_parallel: bool,
     /// Rounded; the centre of the near plane for an orthographic matrix.
     pub(super) eye: DVec3,
-    /// Distances of the eye from the near and the far plane, rounded: a scale.
+    /// Rounded distances of the eye from the near and the far plane: a scale.
     pub(super) near: f64,
-    /// `None` if what is visible has no end.
+    /// `None` if the view volume is infinite.
     pub(super) far: Option<f64>,
 }
 
 impl ViewProjection {
-    /// A camera by its rows as written on paper: of an array by columns its transpose.
+    /// A camera by the rows of its matrix as written on paper.
     ///
-    /// # Errors
-    /// An entry that is not finite, or neither zero nor of a size from 1e-60 to
-    /// 1e60; a singular matrix; one whose clip volume is empty.
+    /// Transpose an array stored by columns.
+    ///
+    /// # Errors An entry that is not finite, or neither zero nor of a size from 1e-60 to 1e60; a
+    /// singular matrix; one whose clip volume is empty.
     pub fn new(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<ViewProjection> {
         for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
             super::finite(name, value)?;
@@ -136,7 +136,7 @@ impl ViewProjection {
         let is_bounded = ahead.iter().all(|&sign| sign > 0);
         for (name, plane) in matrix.planes_about(&[matrix.eye]) {
             match name {
-                // Without an eye the zero is a point of that very plane.
+                // An orthographic matrix has no eye: the origin here lies on the near plane itself.
                 FrustumPlane::Near if !matrix.is_parallel => matrix.near = plane.d.abs(),
                 FrustumPlane::Far if is_bounded => matrix.far = Some(plane.d.abs()),
                 _ => {}
@@ -150,28 +150,29 @@ impl ViewProjection {
         &self.rows
     }
 
-    /// The convention that it was read by.
+    /// The convention that the matrix was read by.
     pub fn convention(&self) -> MatrixConvention {
         self.convention
     }
 
-    /// The matrix that the other order of rows and columns makes of the same entries.
+    /// The matrix of the same entries with rows and columns exchanged.
     pub fn transposed(&self) -> Option<ViewProjection> {
         let entries = self.convention.in_columns(self.rows);
         ViewProjection::new(entries, self.convention.transposed()).ok()
     }
 
-    /// Returns whether depth begins at 0, and not at -w.
+    /// Returns whether depth begins at 0 rather than at -w.
     pub fn is_from_zero(&self) -> bool {
         self.convention.is(FROM_ZERO)
     }
 
-    /// The planes in f64 about the sum of some points, of unit length: sums and
-    /// offsets are exact before they are rounded, so every number of a plane is
-    /// true to 3 units of 2^-53 of itself, but for a factor that all share.
+    /// The planes in f64 relative to the sum of some points, of unit length.
     ///
-    /// A row whose normal is zero is no plane (an infinite far plane), and
-    /// neither is one that lies farther away than f32 has numbers.
+    /// Sums and offsets are exact before they are rounded: every number of a plane is true to 3
+    /// units of 2^-53 of itself, up to a factor common to the plane.
+    ///
+    /// A row with a zero normal is no plane (an infinite far plane); neither is one beyond
+    /// [`FARTHEST`].
     pub(super) fn planes_about(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         let [x, y, z, w] = self.exact_rows();
         let sum = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] + &b[k]);
@@ -199,8 +200,9 @@ impl ViewProjection {
         planes.collect()
     }
 
-    /// The corners of the clip volume about the sum of some points, true to some
-    /// units of 2^-53 of each coordinate; `None` if it has no end.
+    /// The corners of the clip volume relative to the sum of some points.
+    ///
+    /// True to some units of 2^-53 of each coordinate; `None` if the volume is infinite.
     pub(super) fn corners_about(&self, zero: &[DVec3]) -> Option<[DVec3; 8]> {
         let inverse = self.inverse()?;
         let mut corners = [DVec3::ZERO; 8];
@@ -214,7 +216,7 @@ impl ViewProjection {
         self.rows.map(|row| row.map(Expansion::from))
     }
 
-    /// Left or right, bottom or top, each at both ends of depth.
+    /// Corners of the clip volume: left or right, bottom or top, at both ends of depth.
     fn clip_corners(&self) -> [[f64; 4]; 8] {
         let lowest = if self.is_from_zero() { 0.0 } else { -1.0 };
         let side = |i: usize, bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
@@ -224,7 +226,7 @@ impl ViewProjection {
         })
     }
 
-    /// The inverse but for a positive factor; `None` if there is none.
+    /// The inverse up to a positive factor; `None` if the matrix is singular.
     pub(super) fn inverse(&self) -> Option<[Four; 4]> {
         let rows = self.exact_rows();
         let cofactor = |i: usize, j: usize| {
@@ -245,20 +247,20 @@ impl ViewProjection {
     }
 }
 
-/// The point that the projection takes to x = y = w = 0, and whether near is deep.
+/// The preimage of x = y = w = 0, and whether depth is reversed.
 ///
-/// The point is rounded; `None` at infinity. Where z is positive there, depth is reversed
-/// (`true`): near has the larger one. Where z is zero, the name of the convention decides.
+/// The point is rounded; `None` at infinity. Depth is reversed (larger at near) if z is positive
+/// there; if z is zero, the name of the convention decides.
 fn eye_of(inverse: &[Four; 4], by_name: bool) -> (Option<DVec3>, bool) {
     let eye = unprojected(inverse, [0.0, 0.0, 1.0, 0.0]);
     let sign = eye[3].sign();
     let is_reversed = sign > 0 || sign == 0 && by_name;
-    // The same point, with a positive last coordinate.
+    // The same point, with a positive w.
     let eye = if is_reversed { eye } else { eye.map(|e| -&e) };
     (about(&eye, &[]).filter(|eye| eye.is_finite()), is_reversed)
 }
 
-/// The determinant of what is left without a row and a column.
+/// The determinant without a row and a column.
 fn minor(rows: &[Four; 4], row: usize, column: usize) -> Expansion {
     let [a, b, c] = [0, 1, 2].map(|i| &rows[i + usize::from(i >= row)]);
     let [i, j, k] = [0, 1, 2].map(|i| i + usize::from(i >= column));
@@ -277,7 +279,8 @@ pub(super) fn unprojected(inverse: &[Four; 4], clip: [f64; 4]) -> Four {
     })
 }
 
-/// A point in homogeneous coordinates as a point about the sum of others;
+/// Dehomogenises a point, relative to the sum of others.
+///
 /// `None` if it is at infinity or beyond.
 pub(super) fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
     let [.., scale] = point;
@@ -291,8 +294,7 @@ pub(super) fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
     Some(DVec3::new(coordinate(0), coordinate(1), coordinate(2)))
 }
 
-/// A plane about the sum of some points, of unit length; `None` without a
-/// normal.
+/// A unit plane relative to the sum of some points; `None` without a normal.
 fn plane_about(face: &Four, zero: &[DVec3]) -> Option<PlaneF64> {
     let [x, y, z, d] = face;
     let mut offset = d.clone();
@@ -302,7 +304,7 @@ fn plane_about(face: &Four, zero: &[DVec3]) -> Option<PlaneF64> {
         }
     }
     let exponent = exact::exponent(&[x, y, z].map(Expansion::clone))?;
-    // Near 1, so that no square overflows.
+    // Scaled to about 1, so that no square overflows.
     let [x, y, z, d] = [x, y, z, &offset].map(|n| n.scaled(-exponent).estimate());
     let normal = DVec3::new(x, y, z);
     let length = normal.length();

@@ -23,8 +23,8 @@ use crate::geometry::VolumeError;
 
 /// A frame (position and orientation) and a lens.
 ///
-/// World coordinates are f64; the planes that a query needs come from
-/// [`Camera::volume`] in scene-local f32.
+/// World coordinates are f64; the planes that a query needs come from [`Camera::volume`] in
+/// scene-local f32.
 ///
 /// ```
 /// use cullbench::camera::{Camera, Lens, PlaneOptions, Surroundings, look_at};
@@ -52,11 +52,11 @@ pub struct Camera {
 /// A result about cameras.
 pub type Result<T, E = CameraError> = std::result::Result<T, E>;
 
-/// Numbers that make no camera, or a camera whose planes f32 cannot hold.
+/// Numbers that define no camera, or a camera whose planes f32 cannot hold.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// Eye, direction, lens or matrix outside of what is allowed.
+    /// Eye, direction, lens or matrix outside the allowed range.
     #[error("{found}; expected {expected}")]
     Invalid {
         /// The argument and its value.
@@ -85,14 +85,14 @@ impl CameraError {
         CameraError::Invalid { found, expected }
     }
 
-    /// Matrix cameras cannot be moved or given a lens.
+    /// The error for matrix cameras, which cannot be moved or given a lens.
     fn of_matrix(what: &str) -> CameraError {
         let found = format!("the camera is a matrix, which has {what} of its own");
         CameraError::invalid(found, "an eye and a lens for another")
     }
 }
 
-/// Checks a rule of camera arguments; `found` is only formatted where it is broken.
+/// Checks a rule of camera arguments; formats `found` only if it is broken.
 fn require(holds: bool, found: Arguments<'_>, expected: &'static str) -> Result<()> {
     match holds {
         true => Ok(()),

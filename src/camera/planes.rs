@@ -38,41 +38,41 @@ named! {
 pub const DEFAULT_EPSILON: f64 = 8.0;
 
 defaults! {
-    /// How to derive the planes.
+    /// Derivation of the planes, and their epsilon.
     #[derive(Clone, Copy, PartialEq, Debug)]
     pub struct PlaneOptions {
-        /// Which derivation, in which arithmetic.
+        /// Method and arithmetic of the derivation.
         pub method: PlaneMethod = PlaneMethod::default(),
-        /// The factor c; 0 leaves the planes as they come.
+        /// The factor c; 0 leaves the planes unmoved.
         pub epsilon: f64 = DEFAULT_EPSILON,
     }
 }
 
 impl PlaneOptions {
-    /// The same derivation; the planes stay as they come.
+    /// The same derivation without an epsilon.
     pub fn without_epsilon(mut self) -> PlaneOptions {
         self.epsilon = 0.0;
         self
     }
 }
 
-/// Origin and extent of a scene, which planes are rounded and moved for.
+/// Origin and extent of a scene, for which planes are rounded and moved.
 ///
 /// Computed once per scene, so that all structures are queried with the same planes.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Surroundings {
-    /// World position of the scene's local zero.
+    /// World position of the scene's local origin.
     pub origin: DVec3,
     /// Largest absolute local coordinate of any item, per axis.
     ///
-    /// It bounds the epsilon and the sums of the plane test; no guarantee holds for items
-    /// beyond it. Zero is unknown: the epsilon is then the volume's own (and too small
-    /// without a far plane), and sums are not checked for items.
+    /// It bounds the epsilon and the sums of the plane test; no guarantee holds for items beyond
+    /// it. Zero means unknown: the epsilon is then the volume's own (and too small without a far
+    /// plane), and sums are not checked for items.
     pub reach: Vec3,
 }
 
 impl Surroundings {
-    /// Surroundings of boxes whose coordinates are those of the world.
+    /// Surroundings of boxes in world coordinates.
     pub fn of_boxes(items: &[Aabb]) -> Surroundings {
         Surroundings {
             origin: DVec3::ZERO,
@@ -84,30 +84,26 @@ impl Surroundings {
 impl Camera {
     /// The view volume in scene-local f32 coordinates.
     ///
-    /// With a positive epsilon c each plane is moved outward to
-    /// `d' = round_up(d + c*u*(sum |n_k|*x_k + |d|) + ...)`, u = 2^-24, where x
-    /// is the worst point that is visible and near enough to this very plane.
-    /// Why that is enough: a box that meets the volume holds a point x of it,
-    /// and the p-vertex evaluates no lower than x does (rounding is monotone);
-    /// evaluating at x errs by less than the margin. docs/NUMERICS.md has the
-    /// proof.
+    /// With a positive epsilon c each plane is moved outward to `d' = round_up(d + c*u*(sum
+    /// |n_k|*x_k + |d|) + ...)`, u = 2^-24, where x is the worst visible point near enough to the
+    /// plane. This suffices: a box that meets the volume contains a point x of it, and the p-vertex
+    /// evaluates no lower than x (rounding is monotone); the error at x is less than the margin.
+    /// docs/NUMERICS.md has the proof.
     ///
-    /// # Errors
-    /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen
-    /// method loses it); [`CameraError::Sums`] if a sum of the plane test could
-    /// overflow within the surroundings' reach; [`CameraError::Invalid`] for an epsilon or a
-    /// reach that is negative or NaN, or an infinite epsilon.
+    /// # Errors [`CameraError::Volume`] if a plane does not fit f32 (or the chosen method loses
+    /// it); [`CameraError::Sums`] if a sum of the plane test could overflow within the
+    /// surroundings' reach; [`CameraError::Invalid`] for an epsilon or a reach that is negative or
+    /// NaN, or an infinite epsilon.
     pub fn volume(&self, options: &PlaneOptions, around: &Surroundings) -> Result<ConvexVolume> {
         self.volume_with(&[], options, around)
     }
 
     /// The view volume with further planes (scene-local, of unit length).
     ///
-    /// Each plane is rounded to f32 and moved outward like the six: its own error must be
-    /// small against 2^-24. Planes that f32 cannot hold are left out, which is always safe.
+    /// Each plane is rounded to f32 and moved outward like the six: its own error must be small
+    /// against 2^-24. Planes that f32 cannot hold are omitted, which is always safe.
     ///
-    /// # Errors
-    /// The errors of [`Camera::volume`]; more planes than a volume has.
+    /// # Errors The errors of [`Camera::volume`]; more planes than a volume can hold.
     pub fn volume_with(
         &self,
         more: &[PlaneF64],
@@ -122,10 +118,9 @@ impl Camera {
         margin.volume(&named, more, of_scene, 0.0)
     }
 
-    /// The same planes in f64, from the frame and without a margin.
+    /// The planes of the frame in f64, without a margin.
     ///
-    /// # Errors
-    /// [`CameraError::Volume`] if a plane does not even fit f64.
+    /// # Errors [`CameraError::Volume`] if a plane does not even fit f64.
     pub fn convex_volume_f64(&self, around: &Surroundings) -> Result<ConvexVolumeF64> {
         let planes = self.planes_f64(&[around.origin]).into_iter();
         let planes: Vec<PlaneF64> = planes.map(|(_, plane)| plane).collect();
@@ -134,26 +129,23 @@ impl Camera {
 
     /// The view volume in coordinates relative to the eye.
     ///
-    /// The local eye, rounded to f32, becomes their zero; the rest of the rounding goes
-    /// into the offsets in f64, and each plane is rounded to f32 once.
+    /// The local eye, rounded to f32, becomes the origin; its rounding error goes into the offsets
+    /// in f64, and each plane is rounded to f32 once.
     ///
-    /// With a positive epsilon c the planes are moved outward as in
-    /// [`Camera::volume`], with coordinates about the eye, not about the
-    /// scene's own zero: that is what is gained far away. Let u = 2^-24 and x a
-    /// visible point of a box. `x_k - e_k` is rounded once, its product with
-    /// `n_k` once, and the product goes through at most three sums: 5
-    /// roundings; the normal itself was rounded, a sixth. Each is at most u of
-    /// `|n_k| |x_k|`; the offset was rounded and goes through one sum, 2 of
-    /// `|d|`. So c = 6 and a little covers all, and c = 8 does. Two smaller
-    /// things come on top: the subtraction of the scene's origin in f64 (2^-53
-    /// of the local eye), and normals that underflow (2^-150 of x).
+    /// With a positive epsilon c the planes are moved outward as in [`Camera::volume`], but with
+    /// coordinates relative to the eye instead of the scene's origin: that is the gain far away.
+    /// Let u = 2^-24 and x a visible point of a box. `x_k - e_k` is rounded once, its product with
+    /// `n_k` once, and the product goes through at most three sums: 5 roundings; the rounding of
+    /// the normal is the sixth. Each is at most u of `|n_k| |x_k|`; the offset is rounded and goes
+    /// through one sum, 2 of `|d|`. So slightly more than c = 6 covers all, and c = 8 does. Two
+    /// smaller terms are added: the subtraction of the scene's origin in f64 (2^-53 of the local
+    /// eye), and normals that underflow (2^-150 of x).
     ///
-    /// Further planes are about the eye itself and of unit length: see
+    /// Further planes are relative to the unrounded eye and of unit length: see
     /// [`Camera::volume_with`].
     ///
-    /// # Errors
-    /// [`CameraError::Volume`] if the eye or a plane does not fit f32; more planes
-    /// than a volume has.
+    /// # Errors [`CameraError::Volume`] if the eye or a plane does not fit f32; more planes than a
+    /// volume can hold.
     pub fn relative_volume(
         &self,
         more: &[PlaneF64],
@@ -163,7 +155,7 @@ impl Camera {
         let local = self.frame.relative_to(around.origin);
         let eye = local.eye.as_vec3();
         let zero = eye.as_dvec3();
-        // Exact: what is left is a number of f64.
+        // Exact: f64 holds the difference.
         let left = local.eye - zero;
         let about = [around.origin, zero];
         let named = self.derive(&about, PlaneMethod::Frame)?;

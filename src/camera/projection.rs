@@ -1,15 +1,15 @@
 //! Planes of a view volume in f32 and f64, from the frame and from matrices.
 //!
-//! Matrices come through glam: the projections of OpenGL, of D3D and Vulkan, and with reversed Z, off which
-//! Gribb and Hartmann read planes. The default path needs no matrix; they exist so that
-//! their error can be measured against the planes of the frame.
+//! Matrices come from glam: projections of OpenGL, of D3D and Vulkan, and with reversed Z, from
+//! which Gribb and Hartmann extract planes. The default path needs no matrix; matrices exist so
+//! that their error can be measured against the planes of the frame.
 
 use glam::{DMat4, DVec3, Vec3};
 
 use super::{Frame, Lens, LensKind};
 use crate::geometry::{FrustumPlane, Plane, PlaneF64};
 
-/// Depths that a projection maps near and far to.
+/// Depths to which a projection maps near and far.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClipSpace {
     /// near -> -1, far -> 1.
@@ -20,10 +20,11 @@ pub enum ClipSpace {
     ReversedZ,
 }
 
-/// Matrices and their planes in one precision, every operation of it. Everything
-/// that glam offers comes from glam; the infinite far planes that it lacks are the
-/// limit of its finite matrix. Only the cotangent is taken again: glam's sine and
-/// cosine are the platform's, and platforms round them differently.
+/// Matrices and their planes, with every operation in one precision.
+///
+/// Matrices are glam's. Infinite far planes, which glam lacks, are the limit of its finite matrix.
+/// The cotangent is computed again: glam's sine and cosine are the platform's, and platforms round
+/// them differently.
 macro_rules! precision {
     ($module:ident, $float:ty, $Vec:ident, $Vec4:ident, $Mat:ident, $Plane:ident, $glam:ident, $sin:ident, $cos:ident) => {
         pub mod $module {
@@ -34,10 +35,10 @@ macro_rules! precision {
 
             /// The projection matrix of a lens.
             ///
-            /// NaN for a matrix, which is no projection without a view.
+            /// NaN for a matrix lens, which has no projection apart from its view.
             pub fn projection(lens: &Lens, clip: ClipSpace) -> $Mat {
                 let (near, is_gl) = (lens.near(), clip == ClipSpace::OpenGl);
-                // Depths of the first and the last plane in clip space.
+                // Depths at the near and the far end of clip space.
                 let depths = match (clip, lens.far()) {
                     (ClipSpace::ReversedZ, Some(far)) => [far, near],
                     (_, far) => [near, far.unwrap_or(2.0 * near)],
@@ -70,8 +71,8 @@ macro_rules! precision {
                         matrix
                     }
                     LensKind::Orthographic { .. } => return windowed(lens.window()),
-                    // glam's window lies on its near plane, which reversed Z swaps with
-                    // the far one.
+                    // glam's window lies on its near plane, which reversed Z swaps with the far
+                    // one.
                     LensKind::OffAxis { window } => match (clip, lens.far()) {
                         (ClipSpace::ReversedZ, Some(far)) => {
                             windowed(window.map(|edge| edge * (far / near)))
@@ -91,7 +92,7 @@ macro_rules! precision {
                 matrix
             }
 
-            /// Axes and eye as this precision has them.
+            /// Axes and eye in this precision.
             fn rounded(frame: &Frame) -> [$Vec; 4] {
                 let convert = |v: DVec3| $Vec::from(v.to_array().map(|x| x as $float));
                 [frame.u(), frame.v(), frame.n(), frame.eye].map(convert)
@@ -99,12 +100,12 @@ macro_rules! precision {
 
             /// The planes from the camera's frame.
             ///
-            /// The side planes pass through the eye along the window's edges (or, for an
-            /// orthographic lens, stand beside it); near and far face each other.
+            /// The side planes pass through the eye along the window's edges (for an orthographic
+            /// lens, parallel to the axis); near and far face each other.
             pub fn from_frame(frame: &Frame, lens: &Lens) -> Vec<(FrustumPlane, $Plane)> {
                 let [u, v, n, eye] = rounded(frame);
                 let [left, right, bottom, top] = lens.window().map(|edge| edge as $float);
-                // The edge at `edge` along `axis`, seen from its inner side.
+                // The side plane at `edge` along `axis`, facing inward.
                 let side = |axis: $Vec, edge: $float| {
                     if lens.is_orthographic() {
                         return $Plane::new(axis, -axis.dot(eye) - edge);
@@ -143,10 +144,10 @@ macro_rules! precision {
 
             /// The six planes of the clip matrix: left, right, bottom, top, near, far.
             ///
-            /// A far plane at infinity comes out with a normal of zero or none.
+            /// A far plane at infinity has a normal that is zero or not finite.
             ///
-            /// Gribb and Hartmann 2001, "Fast extraction of viewing frustum planes
-            /// from the world-view-projection matrix".
+            /// Gribb and Hartmann 2001, "Fast extraction of viewing frustum planes from the
+            /// world-view-projection matrix".
             pub fn planes(frame: &Frame, lens: &Lens, clip: ClipSpace) -> [Plane; 6] {
                 let m = (projection(lens, clip) * view(frame)).transpose();
                 let (x, y, z, w) = (m.x_axis, m.y_axis, m.z_axis, m.w_axis);

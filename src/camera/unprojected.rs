@@ -6,15 +6,15 @@ use super::matrix::{about, unprojected};
 use super::{Camera, FARTHEST, Lens, Pose, Result, ViewProjection, require};
 use crate::geometry::FrustumPlane;
 
-/// A view whose depth is a smaller share of its distance from the eye counts as
-/// orthographic: f64 has more digits for parallel lines of sight than for an eye.
+/// Depth of a view / its distance from the eye, below which it is orthographic.
+///
+/// Below that, f64 resolves parallel lines of sight better than an eye.
 const PARALLEL: f64 = 1e-8;
 
-/// Largest shear and tilt of a camera with rays; f32 rounding makes some 1e-7.
+/// Largest shear and tilt of a camera with rays; f32 rounding causes about 1e-7.
 const STRAIGHT: f64 = 1e-5;
 
-/// Opposite edges of a window are this much alike, relative to its size, where its
-/// lens is symmetric.
+/// Most difference of opposite edges of a symmetric lens, relative to its window.
 const SYMMETRIC: f64 = 1e-6;
 
 /// A view-projection matrix as a frame and a lens, rounded.
@@ -47,14 +47,13 @@ impl Unprojected {
 }
 
 impl ViewProjection {
-    /// The frame and the lens that this matrix was made of.
+    /// The frame and the lens that this matrix was made from.
     ///
-    /// # Errors
-    /// A view that no lens holds, such as one with near and far plane in one place.
+    /// # Errors A view that no lens describes, such as one with coincident near and far planes.
     pub fn unprojected(&self) -> Result<Unprojected> {
         let along = |row: usize| DVec3::from_slice(&self.rows[row]);
         let [x, y, z, w] = [0, 1, 2, 3].map(along);
-        // Without an exact inverse where far is clearly farther from an eye than near.
+        // The exact inverse is not needed if far is clearly farther from an eye than near.
         let is_eye = !self.is_parallel && self.near < FARTHEST;
         let is_clear = is_eye && self.far.is_none_or(|far| far > 2.0 * self.near);
         let axis = if is_clear { None } else { self.axis() };
@@ -70,7 +69,7 @@ impl ViewProjection {
         let (across, upward) = (aside(x), aside(y));
         let is_mirrored = across.cross(upward).dot(forward) > 0.0;
         let image = [across, upward].map(DVec3::normalize);
-        // Only Vulkan's clip space has y downward.
+        // Of all clip spaces only Vulkan's has y downward.
         let is_of_vulkan = self.convention().name().starts_with("column-d3d");
         let up = match is_mirrored && is_of_vulkan {
             true => -upward,
@@ -96,13 +95,13 @@ impl ViewProjection {
         })
     }
 
-    /// Returns whether it has no lens: axes of unit length, and w is 1 everywhere.
+    /// Returns whether the matrix is a view alone: unit axes, and w is 1 everywhere.
     pub fn is_bare(&self) -> bool {
         let is_unit = |row: &[f64; 4]| (DVec3::from_slice(row).length() - 1.0).abs() < STRAIGHT;
         self.rows[..3].iter().all(is_unit) && self.rows[3] == [0.0, 0.0, 0.0, 1.0]
     }
 
-    /// Returns whether it has a lens alone: the eye at 0 and the axes of the world.
+    /// Returns whether it is a projection alone: the eye at 0, axes of the world.
     pub fn is_lone(&self) -> bool {
         let [x, y, z, w] = self.rows;
         [x[1], x[3], y[0], y[3], z[0], z[1], w[0], w[1], w[3]] == [0.0; 9]
@@ -117,7 +116,8 @@ impl ViewProjection {
         }
     }
 
-    /// The centre of the near plane, and the way from there to that of the far plane;
+    /// The centre of the near plane, and the vector from there to the far plane's.
+    ///
     /// `None` if that is at infinity.
     pub(super) fn axis(&self) -> Option<[DVec3; 2]> {
         let inverse = self.inverse()?;
@@ -157,10 +157,9 @@ impl ViewProjection {
 }
 
 impl Camera {
-    /// This camera with a frame and a lens of its own, whose rays are known.
+    /// This camera with its own frame and a lens whose rays are known.
     ///
-    /// # Errors
-    /// A matrix whose image is sheared or whose near plane is oblique.
+    /// # Errors A matrix whose image is sheared or whose near plane is oblique.
     pub fn unprojected(&self) -> Result<Camera> {
         let Some(matrix) = self.lens.matrix() else {
             return Ok(*self);
@@ -188,7 +187,7 @@ mod tests {
 
     const EYE: DVec3 = DVec3::new(3.0, -2.0, 5.0);
 
-    /// Reads a matrix as its user names it: by columns or, transposed, by rows.
+    /// Reads a matrix in a convention: by columns or, transposed, by rows.
     fn read(matrix: DMat4, convention: MatrixConvention) -> Camera {
         let rows = matrix.transpose().to_cols_array_2d();
         Camera::of_matrix(convention.in_columns(rows), convention).expect("a camera")
@@ -211,7 +210,7 @@ mod tests {
         .map(|lens| lens.expect("a lens"))
     }
 
-    /// Largest difference of edges, near and far, relative to the larger.
+    /// Largest relative difference of edges, near and far.
     fn difference(a: &Lens, b: &Lens) -> f64 {
         let relative = |(a, b): (f64, f64)| (a - b).abs() / a.abs().max(b.abs());
         let edges = a.window().into_iter().zip(b.window());
@@ -224,9 +223,9 @@ mod tests {
         edges.map(relative).fold(depth, f64::max)
     }
 
-    /// Every lens, hand of the world (x mirrored is the left) and clip space.
+    /// Every lens, handedness of the world (x mirrored is left) and clip space.
     ///
-    /// Each under the right name and under that of the other end of depth.
+    /// Each under its own convention and under the one with reversed depth.
     #[test]
     fn a_matrix_is_the_camera_that_it_was_made_of() {
         let frame = look_at(EYE, DVec3::ZERO, DVec3::Z).unwrap();
@@ -248,7 +247,7 @@ mod tests {
                         let read = read(matrix, named);
                         let what = format!("{lens:?} {hand} {named:?} {slack}: {read:?}");
                         check(&read, &lens, &frame, slack, &what);
-                        // Without an eye the name decides.
+                        // Without an eye the name of the convention decides.
                         let parallel = lens.is_orthographic();
                         let is_swapped = parallel && ![name, name.transposed()].contains(&named);
                         let found = taken_apart(&read);
@@ -273,7 +272,7 @@ mod tests {
         }
     }
 
-    /// The axes of the image up to their signs, the lens, and the camera of the rays.
+    /// Checks the image's axes up to their signs, the lens, and the camera of the rays.
     fn check(read: &Camera, lens: &Lens, frame: &Frame, slack: f64, what: &str) {
         let found = taken_apart(read);
         assert!(found.shear < 1e-5 && found.tilt < 1e-5, "{what}");
@@ -346,7 +345,7 @@ mod tests {
         let projection = lens.projection(OpenGl);
         let mut sheared = projection;
         sheared.y_axis.x = 0.01;
-        // An oblique near plane in place of the lens's own (Lengyel 2005).
+        // An oblique near plane in place of the lens's (Lengyel 2005).
         let mut oblique = projection;
         oblique.x_axis.z = 0.2;
         for (matrix, wanted) in [

@@ -1,11 +1,11 @@
 //! Extended planes, which complete the six planes of a frustum.
 //!
-//! With them the p-vertex test is the full separating axis test. They are selected in f64
-//! for speed; every selected plane is safe, because it is a sum of given planes. The
-//! oracle has the theory and the exact version.
+//! With them the p-vertex test is the full separating axis test. They are selected in f64 for
+//! speed; every selected plane is safe, because it is a sum of given planes. The oracle has the
+//! theory and the exact version.
 //!
-//! All planes are about a point near the volume (the eye): about a zero far
-//! away the digits of small features would be lost.
+//! All planes are relative to a point near the volume (the eye): relative to a far origin the
+//! digits of small features would be lost.
 
 use glam::DVec3;
 
@@ -15,20 +15,19 @@ use crate::geometry::{MAX_PLANES, PlaneF64};
 /// Rounding error of a sum of unit normals that is zero: some units of 2^-53 each.
 const RESIDUE: f64 = 1.0 / (1u64 << 49) as f64;
 
-/// The volume's bounds along the axes.
+/// Axis-parallel bounds of the volume: up to six planes, fewer if it is unbounded.
 ///
-/// Up to six planes, fewer where it has no bound.
-///
-/// Each is a sum of three faces, with positive weights, that leaves one axis
-/// of the normal, moved outward by what making it can cost at points within
-/// `reach` of the zero. O(m^3) for m faces.
+/// Each is a sum of three faces, with positive weights, whose normal is parallel to an axis, moved
+/// outward by the rounding errors of the sum at points within `reach` of the origin. O(m^3) for m
+/// faces.
 pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     /// Rounding error of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
     /// Largest rounding error of a sum of length 1.
     const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
-    /// Least length of a sum that still has digits. Views of up to 179.99 degrees keep
-    /// their bounds with it.
+    /// Least length of a sum with significant digits.
+    ///
+    /// Views of up to 179.99 degrees keep their bounds with it.
     const CANCELLED: f64 = 2e-9;
     let mut tightest: [Option<f64>; 6] = [None; 6];
     for [a, b, c] in combinations(faces.len()).map(|triple| triple.map(|face| &faces[face])) {
@@ -38,8 +37,7 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
             cross(a.normal, b.normal),
         ];
         for axis in 0..3 {
-            // Zero where two faces do already (an edge across the
-            // axis), but for rounding.
+            // Zero, up to rounding, if two faces suffice (an edge perpendicular to the axis).
             let clean = |w: f64| if w.abs() < ROUNDING { 0.0 } else { w };
             let given = crossed.map(|w| w[axis]);
             let weights = given.map(clean);
@@ -69,19 +67,20 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     planes.collect()
 }
 
-/// The silhouettes of the volume seen along the axes: up to eighteen planes
-/// for a frustum, through its edges and parallel to an axis.
+/// Silhouettes of the volume seen along the axes: up to eighteen for a frustum.
 ///
-/// Each is the sum of two faces that pull the axis both ways; only sums that
-/// touch the volume are kept, the tightest ones if there are too many for
-/// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for
-/// the m faces' corners and O(m^2) sums.
+/// Planes through its edges and parallel to an axis. Each is the sum of two faces whose normals
+/// have opposite signs on that axis. Only sums that touch the volume are kept, the tightest ones if
+/// there are more than `room`, each moved outward by the rounding errors of the sum within `reach`.
+/// O(m^3) for the corners of m faces, O(m^2) sums.
 fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
-    /// Least length of a sum of unit normals: a shorter one has lost too many digits
-    /// to be a plane (1e-9 of it would be noise). Omitting it is always safe.
+    /// Least length of a sum of unit normals with significant digits.
+    ///
+    /// A shorter one has an error of more than 1e-9 of its length. Omitting it is always safe.
     const CANCELLED: f64 = 1e-7;
-    /// How near to a corner a sum must pass, as a share of the magnitudes
-    /// there: far above rounding, far below the gap of a sum that is idle.
+    /// Most distance of a sum from a corner it touches, per sum of magnitudes there.
+    ///
+    /// Far above rounding, far below the gap of a redundant sum.
     const TIGHT: f64 = 1e-7;
     let corners = PlaneF64::corners(faces);
     let mut found: Vec<(f64, PlaneF64)> = Vec::new();
@@ -114,14 +113,14 @@ fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
     found.into_iter().map(|(_, plane)| plane).collect()
 }
 
-/// Planes of the exact test beside the faces: bounds and silhouettes.
+/// Planes of the exact test in addition to the faces: bounds and silhouettes.
 pub fn extended(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     let bounds = bounds(faces, reach);
     let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
     [bounds, silhouettes(faces, room, reach)].concat()
 }
 
-/// How far the corners of a bounded volume are from the zero.
+/// Largest distance of a bounded volume's corners from the origin.
 pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
     let lengths = PlaneF64::corners(faces).into_iter().map(DVec3::length);
     lengths.fold(0.0, f64::max)

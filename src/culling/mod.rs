@@ -1,4 +1,4 @@
-//! Culling tests and arithmetics: from a camera to the volume of all queries.
+//! Culling tests and arithmetics: from a camera to the volume that queries use.
 
 mod extended;
 
@@ -33,7 +33,7 @@ named! {
 }
 
 impl CullingTest {
-    /// The items as an index for this test must hold them.
+    /// The items in the form that an index for this test holds.
     ///
     /// The boxes, or for `sphere` the cubes about their bounding spheres.
     pub fn items<'a>(self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
@@ -45,7 +45,7 @@ impl CullingTest {
 }
 
 named! {
-    /// The numbers of the test.
+    /// Precision and coordinates of the test.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     #[non_exhaustive]
@@ -59,14 +59,14 @@ named! {
     }
 }
 
-/// All choices together: one point of the error-against-time diagram.
+/// All choices: one point of the error-against-time diagram.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Culling {
-    /// The shape that boxes are compared with.
+    /// The test of boxes.
     pub test: CullingTest,
-    /// The numbers that it is compared in.
+    /// Its precision and coordinates.
     pub arithmetic: Arithmetic,
-    /// How its planes are derived, and their epsilon.
+    /// Derivation of its planes, and their epsilon.
     pub planes: PlaneOptions,
 }
 
@@ -87,7 +87,7 @@ pub enum CullingError {
         /// Name of the derivation.
         method: &'static str,
     },
-    /// Spheres have no arithmetic but f32.
+    /// Spheres are tested in f32 only.
     #[error("the sphere test is made in f32 scene coordinates; expected --arithmetic f32")]
     Sphere,
 }
@@ -106,7 +106,7 @@ pub enum CameraView {
 }
 
 impl CameraView {
-    /// The same as what structures are queried with.
+    /// The view as a query volume.
     pub fn as_any(&self) -> AnyVolume<'_> {
         match self {
             CameraView::Volume(view) => view.into(),
@@ -118,7 +118,7 @@ impl CameraView {
 }
 
 impl Culling {
-    /// A test in these numbers with planes derived so.
+    /// A test in this arithmetic with planes derived in this way.
     pub fn new(test: CullingTest, arithmetic: Arithmetic, planes: PlaneOptions) -> Culling {
         Culling {
             test,
@@ -127,7 +127,7 @@ impl Culling {
         }
     }
 
-    /// Every test in all numbers that it is made in, with planes derived so.
+    /// Every test in every arithmetic it supports, with planes derived in this way.
     pub fn all(planes: PlaneOptions) -> impl Iterator<Item = Culling> {
         let of_test = move |(test, ..): (CullingTest, &str, &str)| {
             ARITHMETICS.map(|(numbers, ..)| Culling::new(test, numbers, planes))
@@ -141,8 +141,7 @@ impl Culling {
     /// The same view serves every structure. O(m^3) for the m planes of the lens, a few
     /// microseconds for `exact`.
     ///
-    /// # Errors
-    /// Planes that do not fit f32; combinations that make no sense.
+    /// # Errors Planes that do not fit f32; invalid combinations.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
         self.check()?;
         let local_eye = camera.frame.eye - around.origin;
@@ -155,7 +154,7 @@ impl Culling {
                 if self.test != CullingTest::Sphere {
                     return Ok(CameraView::Volume(volume));
                 }
-                // The cubes about the items' spheres are what is indexed.
+                // The index holds the cubes about the items' spheres.
                 let reach = around.reach.as_dvec3();
                 check_sums(&volume, reach + reach.length())?;
                 Ok(CameraView::Spheres(Box::new(Spheres::new(&volume))))
@@ -173,10 +172,9 @@ impl Culling {
         }
     }
 
-    /// Checks that the choices go together.
+    /// Checks that the choices can be combined.
     ///
-    /// # Errors
-    /// Which of them do not.
+    /// # Errors Names the conflicting choices.
     pub fn check(&self) -> Result<(), CullingError> {
         if self.arithmetic != Arithmetic::F32 {
             if self.planes.method != PlaneMethod::Frame {
@@ -190,7 +188,7 @@ impl Culling {
         Ok(())
     }
 
-    /// Factor c of the planes' margin: f64 has none.
+    /// Factor c of the planes' margin; 0 in f64, which has none.
     pub fn epsilon(&self) -> f64 {
         match self.arithmetic {
             Arithmetic::F64 => 0.0,
@@ -200,13 +198,13 @@ impl Culling {
 
     /// The reason why the planes may lose visible items.
     ///
-    /// `None` if their margin is proven to keep them.
+    /// `None` if their margin is proven to suffice.
     pub fn unproven(&self) -> Option<String> {
         let epsilon = self.epsilon();
         let found = match self.planes.method {
             PlaneMethod::Frame if epsilon >= DEFAULT_EPSILON => return None,
             PlaneMethod::Frame if self.arithmetic == Arithmetic::F64 => "f64".to_owned(),
-            // No sign of zero, and exponents of small numbers.
+            // No negative zero; small numbers in exponential form.
             PlaneMethod::Frame => {
                 let c = format!("{:?}", epsilon + 0.0);
                 format!("c = {}", c.trim_end_matches(".0"))
@@ -219,10 +217,10 @@ impl Culling {
         ))
     }
 
-    /// Planes of the test beyond the faces, about the eye.
+    /// Planes of the test besides the faces, relative to the eye.
     ///
-    /// They are derived in f64 from the planes of the camera basis, for every plane
-    /// method: rounding can turn sums of rounded planes by more than the margin covers.
+    /// Derived in f64 from the planes of the camera basis, for every plane method: rounding can
+    /// turn sums of rounded planes by more than the margin covers.
     fn more(
         &self,
         camera: &Camera,
@@ -239,7 +237,7 @@ impl Culling {
             ..Surroundings::default()
         };
         let faces = camera.convex_volume_f64(&about_eye)?;
-        // Reach of the items about the eye, or of the volume if the items are unknown.
+        // Reach of the items relative to the eye, or of the volume if the items are unknown.
         let reach = match around.reach {
             Vec3::ZERO => farthest_corner(faces.planes()),
             of_scene => (of_scene.as_dvec3() + local_eye.abs()).length(),
@@ -282,8 +280,10 @@ mod tests {
         assert!((24..=30).contains(&exact), "{exact}");
     }
 
-    /// A view a hundred million times as high as wide: weights of its planes' sums are
-    /// as small as their rounding, and no box is nearer to its sides than a tenth.
+    /// A view 1e8 times as high as wide.
+    ///
+    /// Weights of its planes' sums are as small as their rounding. Boxes are at least a tenth of
+    /// the half-width away from its sides.
     #[test]
     fn nothing_in_the_middle_of_a_needle_is_lost_in_any_arithmetic() {
         let frame = Frame::looking_along(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
@@ -367,7 +367,7 @@ mod tests {
         }
     }
 
-    /// Nothing but the test's own planes is too large for f32.
+    /// Only the test's own planes are too large for f32.
     #[test]
     fn further_planes_that_f32_cannot_hold_are_left_out() {
         let frame = Frame::looking_along(DVec3::ZERO, DVec3::new(0.6, 0.0, -0.8), DVec3::Y);
@@ -420,7 +420,7 @@ mod tests {
                     "{name} 2^{power}: {error:?}"
                 );
             }
-            // A far plane out there is no plane.
+            // A far plane that distant is omitted.
             assert_eq!(lens.with_far(Some(beyond)).unwrap().far(), None);
         }
     }

@@ -7,9 +7,8 @@ use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_
 
 /// A closed axis-aligned box `[min, max]` in scene-local f32 coordinates.
 ///
-/// Zero thickness is allowed. A box with `min > max` on any axis is the empty
-/// set: nothing sees it, and it meets nothing. [`Aabb::union_of`] leaves it out;
-/// [`Aabb::union`] does so only with [`Aabb::EMPTY`].
+/// Zero thickness is allowed. A box with `min > max` on any axis is the empty set: nothing sees it,
+/// and it meets nothing. [`Aabb::union_of`] skips such boxes; [`Aabb::union`] only [`Aabb::EMPTY`].
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Aabb {
@@ -28,15 +27,13 @@ impl Default for Aabb {
 impl Aabb {
     /// The empty box: the neutral element of [`Aabb::union`].
     ///
-    /// Its centre is NaN, its extent minus infinity, and its area means nothing.
+    /// Its centre is NaN, its extent minus infinity, its area meaningless.
     pub const EMPTY: Aabb = Aabb {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
     };
 
-    /// The box between two corners.
-    ///
-    /// The empty set where `min` is above `max` on any axis.
+    /// The box between two corners; empty if `min > max` on any axis.
     pub const fn new(min: Vec3, max: Vec3) -> Self {
         Aabb { min, max }
     }
@@ -46,21 +43,20 @@ impl Aabb {
         Aabb::new(centre - half, centre + half)
     }
 
-    /// The smallest f32 box about `origin` that holds the f64 box exactly.
+    /// The smallest f32 box relative to `origin` that contains the f64 box exactly.
     ///
     /// Both bounds are rounded outward, so nothing inside is ever lost.
     ///
-    /// Bounds beyond the range of f32 come out infinite; check
-    /// [`Aabb::is_finite`].
+    /// Bounds beyond the range of f32 become infinite; check [`Aabb::is_finite`].
     pub fn rounded_outward(min: DVec3, max: DVec3, origin: DVec3) -> Self {
         let down = |axis: usize| difference_down(min[axis], origin[axis]);
         let up = |axis: usize| difference_up(max[axis], origin[axis]);
         Aabb::new([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
-    /// Both corners in the world, where `origin` is the box's zero.
+    /// Both corners in world coordinates; the box is relative to `origin`.
     ///
-    /// Rounded outward too, in the rare case that f64 cannot hold the sum.
+    /// Rounded outward in the rare case that f64 cannot hold the sum.
     pub fn in_world(&self, origin: DVec3) -> (DVec3, DVec3) {
         let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
         let down = |axis: usize| sum_down(origin[axis], min[axis]);
@@ -68,13 +64,13 @@ impl Aabb {
         ([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
-    /// The box as seen from `eye`.
+    /// The box relative to `eye`.
     ///
-    /// Each bound minus the eye's coordinate, rounded to nearest and kept finite.
+    /// Each bound minus the eye's coordinate, rounded to nearest and clamped to finite numbers.
     ///
-    /// Rounding is monotone and so is the clamp: a box within another stays
-    /// within it, bound by bound. (Without the clamp an overflow times a zero
-    /// of a normal would be a NaN, in an item but not in its node.)
+    /// Rounding is monotone and so is the clamp: a box within another stays within it, bound by
+    /// bound. (Without the clamp an overflow times a zero of a normal would be a NaN, in an item
+    /// but not in its node.)
     #[inline(always)]
     pub fn relative_to(&self, eye: Vec3) -> Aabb {
         let (low, high) = (self.min - eye, self.max - eye);
@@ -82,7 +78,7 @@ impl Aabb {
         Aabb::new(kept(low), kept(high))
     }
 
-    /// Returns whether the box holds no point at all (`min > max` somewhere).
+    /// Returns whether the box contains no point (`min > max` on some axis).
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
@@ -92,14 +88,14 @@ impl Aabb {
         self.min.is_finite() && self.max.is_finite()
     }
 
-    /// The smallest box that holds both. Exact: min and max never round.
+    /// The smallest box that contains both. Exact: min and max never round.
     ///
-    /// Neither may be empty, but for [`Aabb::EMPTY`]; [`Aabb::union_of`] takes any.
+    /// Neither may be empty, except for [`Aabb::EMPTY`]; [`Aabb::union_of`] takes any.
     pub fn union(&self, other: &Aabb) -> Aabb {
         Aabb::new(self.min.min(other.min), self.max.max(other.max))
     }
 
-    /// The smallest box that holds all the non-empty boxes of `boxes`.
+    /// The smallest box that contains all non-empty boxes of `boxes`.
     pub fn union_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
         let filled = boxes.into_iter().filter(|b| !b.is_empty());
         filled.fold(Aabb::EMPTY, |all, b| all.union(b))
@@ -132,7 +128,7 @@ impl Aabb {
         overlap && !self.is_empty() && !other.is_empty()
     }
 
-    /// Mid point; NaN of [`Aabb::EMPTY`].
+    /// Midpoint; NaN for [`Aabb::EMPTY`].
     ///
     /// Halves before adding, so that huge bounds do not overflow.
     #[inline(always)]
@@ -140,7 +136,7 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
-    /// Half of the edge lengths; finite also of a box as wide as all of f32.
+    /// Half of the edge lengths; finite even for a box as wide as all of f32.
     #[inline(always)]
     pub fn half_extent(&self) -> Vec3 {
         self.max * 0.5 - self.min * 0.5
@@ -158,28 +154,28 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// Half the surface; of an empty box without meaning.
+    /// Half the surface; meaningless for an empty box.
     pub fn half_area(&self) -> f32 {
         let e = self.extent();
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
-    /// The box about the same zero, `scale` times as large.
+    /// The box scaled by `scale` about its origin.
     pub fn scaled(&self, scale: f32) -> Aabb {
         Aabb::new(self.min * scale, self.max * scale)
     }
 
     /// Power of two that scales a scene with these bounds so that areas fit f32.
     ///
-    /// 1 for coordinates between 2^-40 and 2^40; beyond, areas that are compared would
-    /// overflow or vanish, and the scene is brought to about unit size.
+    /// 1 for coordinates between 2^-40 and 2^40; beyond, areas that are compared would overflow or
+    /// vanish, so the scene is scaled to about unit size.
     pub fn scale_for_areas(&self) -> f32 {
         let largest = self.reach().max_element();
         let exponent = libm::ilogbf(largest);
         if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
             return 1.0;
         }
-        // Clamped to normal numbers; a subnormal scene is brought to 2^-23.
+        // Clamped to normal numbers: a subnormal scene is scaled to 2^-23.
         libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
     }
 
@@ -193,14 +189,14 @@ impl Aabb {
         self.min.abs().max(self.max.abs())
     }
 
-    /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
+    /// Corner `i` of eight: bit k of `i` selects `max` on axis k.
     pub fn corner(&self, i: usize) -> Vec3 {
         let ends = [self.min, self.max];
         Vec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2 & 1].z)
     }
 }
 
-/// An infinity becomes the largest number of its sign.
+/// Clamps infinities to the largest finite number of their sign.
 #[inline(always)]
 pub(super) fn held(x: f32) -> f32 {
     let x = if x < f32::MAX { x } else { f32::MAX };

@@ -1,7 +1,7 @@
 //! Bounding spheres in blocks of sixteen: centre and radius, 16 bytes per item.
 //!
-//! Four rows decide nearly every item by one sum per plane. Items within the rounding
-//! errors of a plane get the test of [`Spheres::drops`], so the sets are the same.
+//! Four rows decide nearly every item with one sum per plane. Items within the rounding errors of a
+//! plane get the test of [`Spheres::drops`], so the sets are the same.
 
 use std::hint::cold_path;
 
@@ -19,16 +19,16 @@ pub struct BallBlock {
 #[derive(Clone, Default, Debug)]
 pub struct BallBlocks {
     blocks: Vec<BallBlock>,
-    /// No coordinate of any item is larger. Setting a sphere enlarges it.
+    /// Upper bound of all absolute coordinates of items. Setting a sphere enlarges it.
     pub reach: f32,
 }
 
-/// The spheres of a structure with the doubt of one query about them.
+/// The spheres of a structure with the error bound of one query.
 #[derive(Clone, Copy, Debug)]
 pub struct Balls<'t> {
-    /// Sixteen spheres each.
+    /// Blocks of sixteen spheres.
     pub blocks: &'t [BallBlock],
-    /// Distances from a plane up to which a sum decides nothing: [`Spheres::doubt`].
+    /// Distance from a plane up to which a sum is undecided: [`Spheres::doubt`].
     pub doubt: f32,
 }
 
@@ -51,7 +51,7 @@ impl BallBlocks {
         all
     }
 
-    /// Sets the sphere at an index, which may lie behind the last one.
+    /// Sets the sphere at an index, which may be beyond the last one.
     #[inline(always)]
     pub fn set(&mut self, at: usize, cube: &Aabb) {
         let ball = Ball::in_cube(cube);
@@ -66,7 +66,7 @@ impl BallBlocks {
         self.reach = self.reach.max(ball.reach);
     }
 
-    /// The blocks for a query; `None` where its numbers overflow.
+    /// The blocks for a query; `None` if its numbers overflow.
     #[inline(always)]
     pub fn seen_by(&self, spheres: &Spheres) -> Option<Balls<'_>> {
         let doubt = spheres.doubt(self.reach)?;
@@ -80,7 +80,7 @@ impl BallBlocks {
     }
 }
 
-/// A plane of length 1 in vectors: normal and offset.
+/// A plane with a unit normal, in vectors: normal and offset.
 pub(super) type Unit<I> = [<I as Isa>::Floats; 4];
 
 #[inline(always)]
@@ -99,7 +99,7 @@ pub(super) fn distances<I: Isa>(
     isa.near_mul_add(c, z, sum)
 }
 
-/// The lanes that are kept, by the distances of their farthest points.
+/// The kept lanes, from the distances of the farthest points of their spheres.
 #[inline(always)]
 pub(super) fn decide<'s, I: Isa>(
     isa: I,
@@ -126,9 +126,9 @@ impl Balls<'_> {
 }
 
 impl Spheres {
-    /// Distance from any plane up to which a sum decides nothing.
+    /// Distance from any plane up to which a sum is undecided.
     ///
-    /// `None` where numbers overflow. `reach` bounds all coordinates of the items.
+    /// `None` if numbers overflow. `reach` bounds all coordinates of the items.
     #[inline(always)]
     pub fn doubt(&self, reach: f32) -> Option<f32> {
         let mut doubt = 0.0;
@@ -182,9 +182,10 @@ impl Spheres {
     }
 }
 
-/// Bounds that spheres leave in doubt, as far planes or items make many.
+/// Boxes that their spheres leave undecided; many if planes or items are far away.
 ///
-/// Tested in vectors, and apart: else a loop may keep its planes in memory for their sake.
+/// Tested in vectors, in a separate function: inlined, it may make a loop keep its planes in
+/// memory.
 struct Doubtful<'s>(&'s Spheres, PlaneMask, &'s BoxBlock);
 
 impl<I: Isa> Piece<I> for Doubtful<'_> {
@@ -218,7 +219,7 @@ mod tests {
         })
     }
 
-    /// Lanes by single planes, and by the frustum of all six.
+    /// Lanes from single planes, and from the frustum of all six.
     struct KeptBalls<'a> {
         spheres: &'a Spheres,
         balls: &'a Balls<'a>,
@@ -242,7 +243,7 @@ mod tests {
 
     /// Compares blocks of spheres and blocks of bounds with the scalar test.
     ///
-    /// `None` where sums over spheres would overflow, else true for a frustum's planes.
+    /// `None` if sums over spheres would overflow, else true for a frustum's planes.
     fn check(boxes: &[Aabb; LANES], planes: &[Plane], mask: PlaneMask) -> Option<bool> {
         let spheres = Spheres::new(&ConvexVolume::from_planes(planes).unwrap());
         let mask = mask & spheres.planes().mask();
@@ -297,7 +298,7 @@ mod tests {
             let boxes = if as_cubes { boxes.map(|b| sphere_cube(&b)) } else { boxes };
             prop_assume!(boxes.iter().all(|b| !b.is_empty() && b.is_finite()));
             let touching = normals.iter().zip(&boxes).map(|((normal, d, ulps), b)| {
-                // Through the sphere's farthest point, but for a few roundings.
+                // Through the sphere's farthest point, up to a few roundings.
                 let ball = Ball::in_cube(b);
                 let far = normal.dot(ball.centre) + ball.radius * normal.length();
                 let touches = f32::from_bits((-far).to_bits().saturating_add_signed(*ulps));
@@ -326,7 +327,7 @@ mod tests {
             });
             let [near, far] = [1.0, 300.0].map(|distance| eye + w * distance * scale);
             let planes = [&planes[..], &[through(w, near), through(-w, far)]].concat();
-            // Each sphere touches a plane but for some roundings.
+            // Each sphere touches a plane, up to some roundings.
             let boxes = spheres.iter().enumerate().map(|(lane, (at, size, off))| {
                 let at = eye + Vec3::from_array(*at) * 400.0 * scale;
                 let cube = sphere_cube(&Aabb::around(at, Vec3::splat(size * 100.0 * scale)));

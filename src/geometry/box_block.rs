@@ -1,7 +1,6 @@
 //! Sixteen boxes side by side: the layout that leaves and scans test.
 //!
-//! Defines the block kernels; each lane computes exactly what [`Plane::excludes`] computes for
-//! one box.
+//! Block kernels; each lane computes exactly what [`Plane::excludes`] computes for one box.
 
 use glam::{Vec3, Vec4};
 
@@ -9,12 +8,12 @@ use super::aabb::held;
 use super::{Aabb, BoxCorner, Plane, PlaneF64, SphereMargin};
 use crate::kernel::{Isa, each, first_lanes, prefetch};
 
-/// Boxes of one block, and one bit for each of them.
+/// Boxes per block, and a mask with one bit per box.
 pub use crate::kernel::{LANES, LaneMask};
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
 ///
-/// Lanes that hold no box hold the empty box; callers mask them out.
+/// Unused lanes hold the empty box; callers mask them out.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(C, align(64))]
 pub struct BoxBlock {
@@ -30,7 +29,7 @@ impl BoxBlock {
         },
     };
 
-    /// Puts a box into a lane, 0 to 15.
+    /// Sets the box in a lane, 0 to 15.
     // Inlined: refits spend their time here.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, b: &Aabb) {
@@ -54,7 +53,7 @@ impl BoxBlock {
         Aabb::new(each([0, 1, 2], low).into(), each([3, 4, 5], high).into())
     }
 
-    /// The lane whose box is nearest to a point by the sum over axes.
+    /// The lane whose box is nearest to a point in the Manhattan distance.
     ///
     /// The first of several.
     pub fn nearest(&self, p: Vec3) -> usize {
@@ -99,7 +98,7 @@ impl BoxBlock {
         &self.rows
     }
 
-    /// The coordinates of one corner, the same one of every box.
+    /// The coordinates of the same corner of every box.
     #[inline(always)]
     pub(crate) fn corner_rows(&self, corner: BoxCorner) -> [&[f32; LANES]; 3] {
         let [x, y, z] = corner.rows();
@@ -139,8 +138,8 @@ impl BoxBlock {
         isa: I,
         planes: impl Iterator<Item = (&'p Plane, BoxCorner, &'p SphereMargin)>,
     ) -> LaneMask {
-        // `Ball::in_cube`, with the same roundings. No closures: those that are called twice
-        // are compiled apart, without the instruction set.
+        // `Ball::in_cube`, with the same roundings. No closures: one that is called twice is
+        // compiled separately, without the instruction set.
         let mut centre = [isa.splat(0.0); 3];
         let mut radius = isa.splat(f32::INFINITY);
         let mut reach = isa.splat(f32::NEG_INFINITY);
@@ -153,7 +152,7 @@ impl BoxBlock {
             reach = isa.max(reach, isa.max(scaled(isa, -1.0, low), high));
         }
         let [x, y, z] = centre;
-        // Cubes cut off at the end of f32 have no sphere.
+        // Cubes clamped to the range of f32 have no sphere.
         let whole = !isa.at_most(isa.splat(f32::MAX), reach);
         let mut kept = LaneMask::MAX;
         for (plane, corner, margin) in planes {
@@ -171,7 +170,7 @@ impl BoxBlock {
         kept
     }
 
-    /// The boxes as seen from `eye`: [`Aabb::relative_to`] lane by lane.
+    /// The boxes relative to `eye`: [`Aabb::relative_to`] lane by lane.
     #[inline(always)]
     pub fn relative_to(&self, eye: Vec3) -> BoxBlock {
         let mut moved = *self;
@@ -183,7 +182,7 @@ impl BoxBlock {
         moved
     }
 
-    /// The lanes whose closed box holds the point.
+    /// The lanes whose closed box contains the point.
     #[inline(always)]
     pub fn holding(&self, p: Vec3) -> LaneMask {
         self.meeting(&Aabb::new(p, p))
@@ -204,17 +203,18 @@ impl BoxBlock {
     }
 }
 
-/// The least or the greatest of every fourth lane.
+/// The minimum or maximum of every fourth lane.
 ///
-/// Lane after lane would be a chain of fifteen comparisons.
+/// Lane by lane would be a chain of fifteen comparisons.
 #[inline(always)]
 fn halved(row: &[f32; LANES], either: impl Fn(Vec4, Vec4) -> Vec4) -> Vec4 {
     let four = |i: usize| Vec4::new(row[i], row[i + 1], row[i + 2], row[i + 3]);
     either(either(four(0), four(4)), either(four(8), four(12)))
 }
 
-/// The bit of each lane, as wide as a float: a comparison then selects among
-/// them without leaving the vector.
+/// The bit of each lane, as wide as a float.
+///
+/// So the result of a comparison stays in vector registers.
 const LANE_BITS: [u32; LANES] = {
     let mut bits = [0; LANES];
     let mut lane = 0;
@@ -236,7 +236,7 @@ fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::F
     isa.add(sums_at(isa, plane.normal, corners), isa.splat(plane.d))
 }
 
-/// The part of it that all planes of one normal have in common.
+/// The part of `value_at` that planes with the same normal share.
 #[inline(always)]
 pub(super) fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
     let sum = isa.add(scaled(isa, n.x, isa.load(x)), scaled(isa, n.y, isa.load(y)));
@@ -250,7 +250,7 @@ fn joined(bits: &[u32; LANES]) -> LaneMask {
 
 /// Boxes in blocks, in the order in which they were pushed.
 ///
-/// The last block is filled up with empty boxes. 24 bytes per box.
+/// The last block is padded with empty boxes. 24 bytes per box.
 #[derive(Clone, Default, Debug)]
 pub struct BoxBlocks {
     blocks: Vec<BoxBlock>,
@@ -267,7 +267,7 @@ impl<'b> FromIterator<&'b Aabb> for BoxBlocks {
 }
 
 impl BoxBlocks {
-    /// No boxes yet, and memory for `boxes` of them.
+    /// No boxes yet, with capacity for `boxes`.
     pub fn with_capacity(boxes: usize) -> Self {
         BoxBlocks {
             blocks: Vec::with_capacity(boxes.div_ceil(LANES)),
@@ -275,7 +275,7 @@ impl BoxBlocks {
         }
     }
 
-    /// Appends a box, into the next free lane.
+    /// Appends a box in the next free lane.
     pub fn push(&mut self, b: &Aabb) {
         let lane = self.count % LANES;
         if lane == 0 {
@@ -287,7 +287,7 @@ impl BoxBlocks {
         self.count += 1;
     }
 
-    /// Number of boxes; the lanes beyond the last one are not counted.
+    /// Number of boxes, without the lanes after the last one.
     pub fn len(&self) -> usize {
         self.count
     }
@@ -325,7 +325,7 @@ impl BoxBlocks {
         }
     }
 
-    /// Gives back the memory beyond the last block.
+    /// Frees the capacity after the last block.
     pub fn shrink_to_fit(&mut self) {
         self.blocks.shrink_to_fit();
     }
@@ -337,17 +337,17 @@ impl BoxBlocks {
 
     /// Exclusive or over the bits of all bounds. O(n).
     ///
-    /// Reads every byte and decides nothing: a bound for any program that reads them all.
+    /// Reads every byte and decides nothing: a floor for any program that reads them all.
     #[inline(always)]
     pub fn xor_of_bits(&self) -> u32 {
         let mut lanes = [0; LANES];
         for block in &self.blocks {
-            // Kept from the loop vectorizer, which with 512-bit vectors takes
-            // sixteen blocks at a time and gathers: seven times slower.
+            // Hidden from the loop vectorizer, which with 512-bit vectors would take sixteen blocks
+            // at a time and gather: seven times slower.
             let [a, b, c, d, e, f] = std::hint::black_box(&block.rows);
             for lane in 0..LANES {
                 let bits = |row: &[f32; LANES]| row[lane].to_bits();
-                // Joined within the block first: one step of the chain a block.
+                // Combined within the block first: one step of the dependency chain per block.
                 lanes[lane] ^= ((bits(a) ^ bits(b)) ^ (bits(c) ^ bits(d))) ^ (bits(e) ^ bits(f));
             }
         }
@@ -362,7 +362,7 @@ impl BoxBlocks {
 
     /// The blocks that hold the boxes `first..end`.
     ///
-    /// Each with the position of its lane 0 and the lanes that belong to the range.
+    /// Each with the position of its lane 0 and its lanes within the range.
     #[inline(always)]
     pub fn range(
         &self,
@@ -375,11 +375,11 @@ impl BoxBlocks {
 
 /// Blocks that hold the boxes `first..end`.
 ///
-/// Yields the index of the box in lane 0 and the lanes that belong to the range.
+/// Yields the index of the box in lane 0 and the lanes within the range.
 #[inline(always)]
 pub fn blocks_of(first: usize, end: usize) -> impl Iterator<Item = (usize, LaneMask)> {
     let mut start = first - first % LANES;
-    // The lanes from `first` on, which only the first block has others than.
+    // The lanes from `first` on; only the first block starts within a block.
     let mut from = LaneMask::MAX << (first % LANES);
     std::iter::from_fn(move || {
         if start >= end {

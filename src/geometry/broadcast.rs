@@ -1,6 +1,7 @@
 //! Planes as the block kernels read them.
 //!
-//! The rows of a block that are a plane's corners, and its numbers in vectors for many blocks.
+//! The rows of a block that are a plane's corners, and the plane's numbers in vectors for many
+//! blocks.
 
 use super::balls::{Unit, decide, distances, splat};
 use super::box_block::{BoxBlock, sums_at};
@@ -10,18 +11,18 @@ use crate::kernel::{Isa, LaneMask, each};
 /// Lanes of a block that no plane excludes, and the open planes of each lane.
 pub type Sorted<I> = (LaneMask, <I as Isa>::Words);
 
-/// Planes of a volume, prepared for many blocks without other open planes.
+/// Planes of a volume, prepared for many blocks with the same open planes.
 pub trait Planes<I: Isa>: Copy {
-    /// True if four blocks at once are faster than one after another.
+    /// True if testing four blocks at once is faster than one by one.
     const IN_FOURS: bool = false;
 
-    /// True if the planes test spheres where a structure has them.
+    /// True if the planes test spheres, if a structure has them.
     const SPHERES: bool = false;
 
-    /// Those of the lanes that the planes do not drop.
+    /// The lanes that the planes do not drop.
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
 
-    /// [`Planes::kept`] of a block with that index, whose spheres are in `balls`.
+    /// [`Planes::kept`] of a block with its index in `balls`, its spheres.
     #[inline(always)]
     fn kept_balls(&self, isa: I, _balls: &Balls, (_, block): (usize, &BoxBlock)) -> LaneMask {
         self.kept(isa, block)
@@ -40,11 +41,11 @@ pub trait Planes<I: Isa>: Copy {
     }
 }
 
-/// One plane as the block kernels read it, in vectors, for many blocks.
+/// One plane in vectors, as the block kernels read it, for many blocks.
 ///
-/// A corner is outside if `(n.x x + n.y y + n.z z) + d < 0`. Here it is if the
-/// sum in brackets is below `-d`, which is the same bit for bit: a rounded sum
-/// of two numbers has the sign of the exact one, and is zero only where that is.
+/// A corner is outside if `(n.x x + n.y y + n.z z) + d < 0`. Testing the sum in brackets against
+/// `-d` is the same bit for bit: a rounded sum of two numbers has the sign of the exact one, and is
+/// zero only if that is.
 #[derive(Clone, Copy)]
 pub struct BroadcastPlane<I: Isa> {
     normal: [I::Floats; 3],
@@ -64,7 +65,7 @@ impl<I: Isa> BroadcastPlane<I> {
         }
     }
 
-    /// Those of the lanes that the plane does not exclude.
+    /// Keeps the lanes that the plane does not exclude.
     #[inline(always)]
     pub(super) fn keep(&self, isa: I, kept: I::Kept, block: &BoxBlock) -> I::Kept {
         let [a, b, c] = self.normal;
@@ -87,7 +88,7 @@ impl<I: Isa> Planes<I> for BroadcastPlane<I> {
     }
 }
 
-/// Planes of [`BroadcastPlanes`]: those of a frustum.
+/// Number of planes of [`BroadcastPlanes`]: those of a frustum.
 pub const MOST_PLANES: usize = 6;
 
 /// The planes of a volume in vectors, for many blocks.
@@ -95,11 +96,11 @@ pub const MOST_PLANES: usize = 6;
 pub struct BroadcastPlanes<I: Isa>([BroadcastPlane<I>; MOST_PLANES]);
 
 impl<I: Isa> BroadcastPlanes<I> {
-    /// The planes of a mask; `None` if they are too many.
+    /// The planes of a mask; `None` if there are too many.
     #[inline(always)]
     pub fn new(isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Option<Self> {
-        // If there are fewer, the first one is tested again; a volume
-        // without any has a plane that excludes nothing in its place.
+        // Missing planes are replaced by the first one; a volume without planes gets one that
+        // excludes nothing.
         let first = BroadcastPlane::new(isa, volume, mask.trailing_zeros());
         let mut planes = [first; MOST_PLANES];
         let mut left = mask;
@@ -173,7 +174,7 @@ pub struct BallFrustum<'a, I: Isa> {
 }
 
 impl<'a, I: Isa> BallFrustum<'a, I> {
-    /// `None` for other planes than those of a symmetric frustum with a far plane.
+    /// `None` unless the planes are those of a symmetric frustum with a far plane.
     #[inline(always)]
     pub fn new(isa: I, spheres: &'a Spheres) -> Option<Self> {
         let sums = spheres.frustum.as_ref()?;
@@ -216,8 +217,8 @@ impl<I: Isa> Planes<I> for BallFrustum<'_, I> {
 impl BoxBlock {
     /// The lanes that none of the planes of a mask excludes.
     ///
-    /// Bit for bit [`Plane::excludes`](super::Plane::excludes), lane by lane. The bits of
-    /// lanes without a box are arbitrary.
+    /// Bit for bit [`Plane::excludes`](super::Plane::excludes), lane by lane. Bits of lanes without
+    /// a box are unspecified.
     #[inline(always)]
     pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
         let mut kept = isa.keep_all();
@@ -231,8 +232,8 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for four blocks.
     ///
-    /// Each plane's numbers are broadcast once for all of them, which pays where all planes
-    /// are open and registers are too few to keep them.
+    /// Each plane's numbers are broadcast once for all four. This pays if all planes are open and
+    /// there are too few registers to keep them.
     #[inline(always)]
     pub fn four_admitted_by<I: Isa>(
         isa: I,
@@ -254,7 +255,7 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for nodes, with the planes open below each lane.
     ///
-    /// A lane's word is `mask` without the planes that hold the whole box
+    /// A lane's word is `mask` without the planes that contain the whole box
     /// ([`Plane::contains`](super::Plane::contains)).
     #[inline(always)]
     pub fn sorted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Sorted<I> {

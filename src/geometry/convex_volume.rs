@@ -1,6 +1,6 @@
 //! The query volume: an intersection of at most 32 half-spaces.
 //!
-//! The six planes of a frustum are named.
+//! The six planes of a frustum have names.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -11,11 +11,11 @@ use super::{Aabb, BoxCorner, Plane, PlaneF64};
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
 
-/// The planes that are not yet decided: bit i stands for plane i.
+/// The planes still to be tested: bit i stands for plane i.
 ///
-/// A node that lies wholly inside plane i has children with a mask without
-/// bit i (Assarsson and Moeller 2000, "Optimized view frustum culling
-/// algorithms for bounding boxes", Journal of Graphics Tools 5(1), pp. 9-22).
+/// The children of a node wholly inside plane i get a mask without bit i (Assarsson and Moeller
+/// 2000, "Optimized view frustum culling algorithms for bounding boxes", Journal of Graphics Tools
+/// 5(1), pp. 9-22).
 pub type PlaneMask = u32;
 
 named! {
@@ -23,22 +23,22 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum FrustumPlane {
-        /// Against the direction of u.
+        /// Towards -u.
         Left = "left",
-        /// In the direction of u.
+        /// Towards u.
         Right = "right",
-        /// Against the direction of v.
+        /// Towards -v.
         Bottom = "bottom",
-        /// In the direction of v.
+        /// Towards v.
         Top = "top",
-        /// Before the eye, across the direction of view.
+        /// In front of the eye, perpendicular to the direction of view.
         Near = "near",
-        /// The end of the view; infinite perspectives have none.
+        /// The far end of the view; infinite perspectives have none.
         Far = "far",
     }
 }
 
-/// Planes that are no volume.
+/// Planes that do not define a volume.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
@@ -67,7 +67,7 @@ impl VolumeError {
         }
     }
 
-    /// A plane, by its label, with numbers that are not finite.
+    /// The error for a plane, by its label, with numbers that are not finite.
     pub(super) fn plane(label: &str, [x, y, z, d]: [impl std::fmt::Display; 4]) -> VolumeError {
         VolumeError::NotFinite {
             what: format!("{label} is not finite"),
@@ -101,7 +101,7 @@ pub struct ConvexVolume {
     count: usize,
     mask: PlaneMask,
     p_vertices: [BoxCorner; MAX_PLANES],
-    /// `-d`, which `n * p` must not be below.
+    /// `-d`, the least `n * p` of a point inside.
     minus_d: [f32; MAX_PLANES],
 }
 
@@ -117,10 +117,10 @@ impl ConvexVolume {
 
     /// A box as six planes.
     ///
-    /// The items that no plane excludes are exactly those that overlap it (closed bounds),
-    /// because a plane along an axis evaluates to a difference of two numbers, whose sign
-    /// no rounding changes. Infinite bounds count as the largest number. An empty box is a
-    /// plane that nothing is inside of.
+    /// The items that no plane excludes are exactly those that overlap it (closed bounds): a plane
+    /// perpendicular to an axis evaluates to a difference of two numbers, whose sign no rounding
+    /// changes. Infinite bounds count as the largest number. An empty box becomes a plane with
+    /// nothing inside.
     pub fn of_box(b: &Aabb) -> Self {
         let planes = (0..3).flat_map(|axis| {
             let normal = Vec3::AXES[axis];
@@ -134,10 +134,9 @@ impl ConvexVolume {
         Self::from_planes(&planes).expect("six finite planes")
     }
 
-    /// Planes of which some have a name.
+    /// A volume of planes, some of which have a name.
     ///
-    /// # Errors
-    /// The errors of [`ConvexVolume::from_planes`].
+    /// # Errors The errors of [`ConvexVolume::from_planes`].
     pub fn from_labelled_planes(
         planes: &[(Option<FrustumPlane>, Plane)],
     ) -> Result<Self, VolumeError> {
@@ -169,7 +168,7 @@ impl ConvexVolume {
         Ok(volume)
     }
 
-    /// `-d` of plane `index`, without a check.
+    /// `-d` of plane `index`, without a bounds check.
     #[inline(always)]
     pub fn minus_d_of_bit(&self, index: u32) -> f32 {
         self.minus_d[index as usize % MAX_PLANES]
@@ -190,9 +189,9 @@ impl ConvexVolume {
         }
     }
 
-    /// The six-plane box test: true unless a plane has the whole box outside.
+    /// The six-plane box test: true unless the whole box is outside one plane.
     ///
-    /// Conservative: boxes beside a frustum edge may pass. An empty box is never seen.
+    /// Conservative: boxes near an edge of the frustum may pass. An empty box is never seen.
     /// O(planes).
     pub fn sees(&self, b: &Aabb) -> bool {
         !b.is_empty() && !self.planes().iter().any(|plane| plane.excludes(b))
@@ -208,8 +207,8 @@ impl ConvexVolume {
 
 /// The closed intersection of up to 32 half-spaces in f64.
 ///
-/// It is tested against f32 boxes, which are promoted exactly. Corners and order of operations are those of the f32 test, so it
-/// is as monotone.
+/// Tested against f32 boxes, which are promoted exactly. Corners and order of operations are those
+/// of the f32 test, so it is monotone too.
 #[derive(Clone, Debug)]
 pub struct ConvexVolumeF64 {
     planes: [PlaneF64; MAX_PLANES],
@@ -219,10 +218,9 @@ pub struct ConvexVolumeF64 {
 }
 
 impl ConvexVolumeF64 {
-    /// The volume on the inner side of all planes; without any it is all of space.
+    /// The volume on the inner side of all planes; all of space without planes.
     ///
-    /// # Errors
-    /// More than 32 planes, or a plane with a NaN or infinite number.
+    /// # Errors More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {
         VolumeError::check_count(planes.len())?;
         for (index, plane) in planes.iter().enumerate() {
@@ -250,14 +248,14 @@ impl ConvexVolumeF64 {
     }
 }
 
-/// The very same planes; only the arithmetic of the test is finer.
+/// The same planes; only the arithmetic of the test has more digits.
 impl From<&ConvexVolume> for ConvexVolumeF64 {
     fn from(volume: &ConvexVolume) -> Self {
         Self::from_finite(volume.planes().iter().map(PlaneF64::from))
     }
 }
 
-/// The planes of a volume, and what is known of them by the bits of its mask.
+/// The planes of a volume and their precomputed data, by the bits of its mask.
 macro_rules! planes_of {
     ($Volume:ident, $Plane:ident) => {
         impl $Volume {
@@ -268,14 +266,14 @@ macro_rules! planes_of {
 
             /// Plane `index` of a mask bit.
             ///
-            /// Like `planes()[index]`, but without a check in the inner loop (a bit index
-            /// is always below [`MAX_PLANES`]).
+            /// Like `planes()[index]`, but without a bounds check in the inner loop (a bit index is
+            /// always below [`MAX_PLANES`]).
             #[inline(always)]
             pub fn plane_of_bit(&self, index: u32) -> &$Plane {
                 &self.planes[index as usize % MAX_PLANES]
             }
 
-            /// The p-vertex of plane `index`, without a check.
+            /// The p-vertex of plane `index`, without a bounds check.
             #[inline(always)]
             pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
                 self.p_vertices[index as usize % MAX_PLANES]
@@ -335,7 +333,7 @@ mod tests {
 
     #[test]
     fn what_f32_rounds_away_decides_in_f64() {
-        // 1e8 - 1 is no f32: in f32 the point touches the plane.
+        // f32 cannot hold 1e8 - 1: in f32 the point touches the plane.
         let plane = PlaneF64::new(DVec3::X, -1e8 - 1.0);
         let b = Aabb::new(Vec3::splat(0.0), Vec3::new(1e8, 0.0, 0.0));
         assert!(plane.excludes(&b) && !plane.narrow().excludes(&b));

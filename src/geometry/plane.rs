@@ -1,8 +1,7 @@
 //! The plane and THE plane test.
 //!
-//! Every structure, kernel and cross-check of this crate goes through the arithmetic of
-//! [`Plane::value_at`]; changing one operation of it changes what the whole toolkit calls
-//! visible.
+//! Every structure, kernel and cross-check of this crate uses the arithmetic of
+//! [`Plane::value_at`]; changing one operation of it changes what the whole toolkit calls visible.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -12,14 +11,14 @@ use crate::arithmetic::combinations;
 
 /// A half-space: the points `x` with `normal . x + d >= 0` (closed).
 ///
-/// The normal points inward and need not have unit length. A zero normal with
-/// `d >= 0` is no constraint at all; with `d < 0` nothing satisfies it.
+/// The normal points inward and need not have unit length. A zero normal with `d >= 0` is no
+/// constraint; with `d < 0` no point satisfies it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Plane {
     /// Points inward; of any length.
     pub normal: Vec3,
-    /// Offset: above 0 where the zero point is inside.
+    /// Offset: positive if the origin is strictly inside.
     pub d: f32,
 }
 
@@ -28,7 +27,7 @@ pub struct Plane {
 pub struct PlaneF64 {
     /// Points inward; of any length.
     pub normal: DVec3,
-    /// Offset: above 0 where the zero point is inside.
+    /// Offset: positive if the origin is strictly inside.
     pub d: f64,
 }
 
@@ -41,15 +40,14 @@ macro_rules! half_space {
                 $Plane { normal, d }
             }
 
-            /// `((nx*x + ny*y) + nz*z) + d` in the numbers of the plane.
+            /// `((nx*x + ny*y) + nz*z) + d` in the precision of the plane.
             ///
             /// Three products, three sums, in this order, no fused multiply-add.
             ///
-            /// Each operation is monotone under round-to-nearest, so a corner that is
-            /// farther along the normal on every axis never evaluates lower. That is
-            /// why a parent box can never contradict its child and why trees return
-            /// the very same set as a linear scan, bit for bit. A box's f32 coordinate is
-            /// an f64 number, so nothing is rounded before the first product.
+            /// Each operation is monotone under round-to-nearest, so a corner that is farther along
+            /// the normal on every axis never evaluates lower. So a parent box never contradicts
+            /// its child, and trees return the same set as a linear scan, bit for bit. A box's f32
+            /// coordinate is an f64 number, so nothing is rounded before the first product.
             #[inline(always)]
             pub fn value_at(&self, x: $Vector) -> $Real {
                 ((self.normal.x * x.x + self.normal.y * x.y) + self.normal.z * x.z) + self.d
@@ -70,12 +68,12 @@ macro_rules! half_space {
                 )
             }
 
-            /// The corner that `p_vertex` takes of every box.
+            /// The corner that `p_vertex` selects, the same for every box.
             pub fn p_vertex_corner(&self) -> BoxCorner {
                 BoxCorner(self.normal.to_array().map(|n| n >= 0.0))
             }
 
-            /// The corner of `b` nearest against the normal (the n-vertex).
+            /// The corner of `b` farthest against the normal (the n-vertex).
             #[inline(always)]
             pub fn n_vertex(&self, b: &Aabb) -> $Vector {
                 self.p_vertex(&Aabb::new(b.max, b.min))
@@ -127,18 +125,18 @@ impl Plane {
 }
 
 impl PlaneF64 {
-    /// The same plane in coordinates about another point.
+    /// The same plane in coordinates relative to `zero`.
     pub fn about(&self, zero: DVec3) -> PlaneF64 {
         PlaneF64::new(self.normal, self.normal.dot(zero) + self.d)
     }
 
-    /// Sum of the magnitudes that the value at a point is made of.
+    /// Sum of the magnitudes of the terms of the value at a point.
     #[inline(always)]
     pub fn size_at(&self, x: DVec3) -> f64 {
         (self.normal * x).abs().element_sum() + self.d.abs()
     }
 
-    /// The value at a point as a share of the magnitudes that it is made of.
+    /// The value at a point relative to the sum of magnitudes of its terms.
     pub fn share_at(&self, x: DVec3) -> f64 {
         let size = self.size_at(x);
         match size == 0.0 {
@@ -147,9 +145,9 @@ impl PlaneF64 {
         }
     }
 
-    /// The corners of the volume behind all faces, to f64 rounding.
+    /// The corners of the volume inside all faces, to f64 rounding.
     pub fn corners(faces: &[PlaneF64]) -> Vec<DVec3> {
-        /// How far outside rounding may put a corner.
+        /// Most relative distance outside a face that rounding may cause.
         const OUTSIDE: f64 = 1e-10;
         let triples = combinations(faces.len()).map(|triple| triple.map(|face| &faces[face]));
         let within = |p: &DVec3| faces.iter().all(|face| face.share_at(*p) >= -OUTSIDE);
@@ -157,7 +155,7 @@ impl PlaneF64 {
         points.filter(within).collect()
     }
 
-    /// The point that three planes share, by Cramer's rule, rounded.
+    /// The common point of three planes, by Cramer's rule, rounded.
     fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
         let crossed = b.normal.cross(c.normal);
         let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
@@ -177,16 +175,16 @@ impl From<&Plane> for PlaneF64 {
     }
 }
 
-/// Corner of a box: on each axis the upper bound, or else the lower one.
+/// Corner of a box: on each axis the upper bound if true, else the lower one.
 ///
-/// The p-vertex of a plane (the corner farthest along its normal) is the same corner of
-/// every box, and so three fixed rows of a block.
-// Booleans and no numbers: a row of theirs needs no check.
+/// The p-vertex of a plane (the corner farthest along its normal) is the same corner of every box:
+/// three fixed rows of a block.
+// Booleans instead of numbers: indexing a row needs no bounds check.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BoxCorner(pub [bool; 3]);
 
 impl BoxCorner {
-    /// The corner across the box; of a p-vertex the n-vertex.
+    /// The opposite corner of the box; the n-vertex for a p-vertex.
     #[inline(always)]
     pub(super) fn opposite(self) -> BoxCorner {
         let BoxCorner([x, y, z]) = self;
@@ -205,21 +203,21 @@ impl BoxCorner {
     }
 }
 
-/// Planes in a tree. Nodes refer to each other by their place in the list.
+/// Planes in a tree; nodes refer to each other by index.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct PlaneTree {
     /// Nodes, in any order.
     pub nodes: Vec<PlaneTreeNode>,
-    /// `None` for a space that is not divided.
+    /// `None` for undivided space.
     pub root: Option<u32>,
 }
 
-/// A dividing plane; its inside is the front.
+/// A dividing plane; its inner side is the front.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PlaneTreeNode {
     /// Its normal points to the front.
     pub plane: Plane,
-    /// Front, then back; `None` where the division ends.
+    /// Front, then back; `None` at a leaf.
     pub children: [Option<u32>; 2],
 }
 
@@ -250,7 +248,7 @@ mod tests {
         assert!(!plane.excludes(&touching));
         let short = Aabb::new(Vec3::ZERO, Vec3::new(1.0f32.next_down(), 1.0, 1.0));
         assert!(plane.excludes(&short));
-        // -0.0 >= 0.0: a sign-bit test would get this one wrong.
+        // -0.0 >= 0.0: a test of the sign bit would fail here.
         assert!(Plane::new(Vec3::X, -0.0).contains_point(Vec3::new(-0.0, 0.0, 0.0)));
     }
 }

@@ -4,7 +4,7 @@
 
 use super::{Aabb, Plane};
 
-/// Planes of one [`PlaneRows`].
+/// Most planes of one [`PlaneRows`].
 pub const ROW_LANES: usize = 8;
 
 type Row = [f32; ROW_LANES];
@@ -20,7 +20,7 @@ pub struct PlaneRows {
 }
 
 impl PlaneRows {
-    /// Collects planes into rows; `None` for more than [`ROW_LANES`].
+    /// Collects planes into rows; `None` if there are more than [`ROW_LANES`].
     pub fn collect<'p>(planes: impl Iterator<Item = &'p Plane>) -> Option<PlaneRows> {
         let mut all = PlaneRows {
             rows: [[0.0; ROW_LANES]; 4],
@@ -53,13 +53,13 @@ impl PlaneRows {
         (0..self.count as usize).map(plane)
     }
 
-    /// The values at the p-vertices, or else at the n-vertices.
+    /// The values at the p-vertices if `FAR`, else at the n-vertices.
     ///
-    /// The p-vertex is found without asking for the normal's sign: rounding is
-    /// monotone, so the larger of `n * min` and `n * max` is `n` times its
-    /// coordinate, up to the sign of a zero, which no comparison sees.
-    // Loops and no closures: what the compiler leaves a call is not compiled
-    // for the instruction set in use.
+    /// The p-vertex needs no test of the normal's sign: rounding is monotone, so the larger of `n *
+    /// min` and `n * max` is `n` times its coordinate, up to the sign of a zero, which no
+    /// comparison distinguishes.
+    // Loops instead of closures: what the compiler does not inline is not compiled for the
+    // instruction set in use.
     #[inline(always)]
     fn values<const FAR: bool>(&self, b: &Aabb) -> Row {
         let [nx, ny, nz, d] = &self.rows;
@@ -73,7 +73,7 @@ impl PlaneRows {
         values
     }
 
-    /// [`PlaneRows::exclude`] and [`PlaneRows::contain`], of the same products.
+    /// [`PlaneRows::exclude`] and [`PlaneRows::contain`] from the same products.
     #[inline(always)]
     pub fn exclude_contain(&self, b: &Aabb) -> (bool, bool) {
         let [nx, ny, nz, d] = &self.rows;
@@ -105,7 +105,7 @@ impl PlaneRows {
     }
 }
 
-/// The larger of two numbers, or else the smaller.
+/// The larger of two numbers if `LARGER`, else the smaller.
 #[inline(always)]
 fn pick<const LARGER: bool>([p, q]: [f32; 2]) -> f32 {
     let first = if LARGER { p > q } else { p < q };

@@ -1,7 +1,7 @@
-//! The plane test about a moving zero.
+//! The plane test relative to the eye.
 //!
-//! Boxes are taken relative to the eye before they meet the planes, as engines with large
-//! worlds do. Far from the scene's zero this keeps the digits that `n . x + d` would cancel.
+//! Boxes are translated to the eye before they meet the planes, as in engines with large worlds.
+//! Far from the scene's origin this keeps digits that `n . x + d` would cancel.
 
 use glam::Vec3;
 
@@ -9,8 +9,8 @@ use super::{Aabb, ConvexVolume, Plane, PlaneF64, VolumeError};
 
 /// Planes in coordinates relative to an f32 eye.
 ///
-/// A box is moved by [`Aabb::relative_to`] and then meets THE plane test:
-/// `((nx*(x-ex) + ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
+/// A box is translated by [`Aabb::relative_to`] and then gets THE plane test: `((nx*(x-ex) +
+/// ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
 #[derive(Clone, Debug)]
 pub struct RelativeVolume {
     /// The eye in f32 scene coordinates, which is subtracted from every box.
@@ -33,12 +33,11 @@ impl RelativeVolume {
         Ok(RelativeVolume { eye, planes })
     }
 
-    /// The planes of a volume about an eye.
+    /// The planes of a volume relative to an eye.
     ///
     /// The offsets become `n . eye + d`, computed in f64 and rounded once.
     ///
-    /// # Errors
-    /// An eye or an offset beyond f32.
+    /// # Errors An eye or an offset beyond f32.
     pub fn about(eye: Vec3, volume: &ConvexVolume) -> Result<Self, VolumeError> {
         let moved = volume.planes().iter().map(PlaneF64::from);
         let moved = moved.map(|plane| plane.about(eye.as_dvec3()).narrow());
@@ -46,13 +45,13 @@ impl RelativeVolume {
         RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
     }
 
-    /// The planes about the eye.
+    /// The planes relative to the eye.
     #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
         &self.planes
     }
 
-    /// A box as the planes see it.
+    /// A box in the coordinates of the planes.
     #[inline(always)]
     pub fn moved(&self, b: &Aabb) -> Aabb {
         b.relative_to(self.eye)
@@ -65,8 +64,8 @@ mod tests {
 
     #[test]
     fn digits_that_a_far_zero_cancels_are_kept() {
-        // A slanting plane through the eye, at ten million: one unit before and one
-        // behind it must differ.
+        // A slanting plane through the eye, at ten million: points one unit in front and behind
+        // must differ.
         let eye = Vec3::new(1e7, -1e7, 0.0);
         let plane = Plane::new(Vec3::new(0.6, 0.8, 0.0), 0.0);
         let about = ConvexVolume::from_planes(&[plane]).unwrap();

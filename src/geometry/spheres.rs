@@ -1,7 +1,7 @@
 //! Culling by bounding spheres.
 //!
-//! An index holds the cube about each sphere. A margin keeps the sphere test on the safe
-//! side of the box test. `balls` has the same test on blocks of centres and radii.
+//! An index holds the cube about each sphere. A margin keeps the sphere test conservative with
+//! respect to the box test. `balls` has the same test on blocks of centres and radii.
 
 use glam::{DVec4, Vec3};
 
@@ -14,19 +14,18 @@ use crate::kernel::each;
 ///
 /// An index over these cubes tests its items as spheres.
 ///
-/// The centre is the box's own, rounded; the radius reaches the farthest
-/// corner from there, rounded up; the cube's bounds are rounded outward. So the
-/// box lies in the sphere and the sphere in the cube, exactly. Bounds beyond
-/// f32 are cut off at its largest number, and [`Ball::in_cube`] then has no
-/// radius. An empty box stays as it is, and so does one that is not finite,
-/// for the build to name.
+/// The centre is the box's centre, rounded; the radius reaches the farthest corner from there,
+/// rounded up; the cube's bounds are rounded outward. So the box lies in the sphere and the sphere
+/// in the cube, exactly. Bounds beyond f32 are clamped to its largest number; [`Ball::in_cube`]
+/// then has an infinite radius. An empty box is returned unchanged, and so is one that is not
+/// finite, for the build to report.
 pub fn sphere_cube(b: &Aabb) -> Aabb {
     if b.is_empty() || !b.is_finite() {
         return *b;
     }
     let centre = b.centre();
     let (c, min, max) = (centre.as_dvec3(), b.min.as_dvec3(), b.max.as_dvec3());
-    // A few roundings in f64, each of at most 2^-53.
+    // A few roundings in f64, each at most 2^-53.
     let radius = (max - c).max(c - min).length() * (1.0 + 8.0 * f64::EPSILON);
     let radius = f64::from(round_up(radius).min(f32::MAX));
     let low = |k: usize| difference_down(c[k], radius).max(f32::MIN);
@@ -34,14 +33,14 @@ pub fn sphere_cube(b: &Aabb) -> Aabb {
     Aabb::new(each([0, 1, 2], low).into(), each([0, 1, 2], high).into())
 }
 
-/// A sphere as it is read back from its cube.
+/// A sphere as read back from its cube.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Ball {
     /// Within the cube.
     pub centre: Vec3,
     /// Radius, never below the one that the cube was made with.
     ///
-    /// Infinite if the cube was cut off at the end of f32.
+    /// Infinite if the cube was clamped to the range of f32.
     pub radius: f32,
     /// Largest absolute coordinate of the cube.
     pub reach: f32,
@@ -50,8 +49,8 @@ pub struct Ball {
 impl Ball {
     /// The sphere in a cube: half the sum and half the difference of the bounds.
     ///
-    /// Each edge of the cube is at least a diameter, so the shortest will do. The centre is
-    /// held between the bounds, from where halving a subnormal may push it.
+    /// Each edge of the cube is at least a diameter, so the shortest suffices. The centre is
+    /// clamped to the bounds, which halving a subnormal may leave.
     #[inline(always)]
     pub fn in_cube(cube: &Aabb) -> Ball {
         let (low, high) = (cube.min, cube.max);
@@ -73,40 +72,41 @@ impl Ball {
     }
 }
 
-/// Numbers of a plane that the sphere test needs besides its normal.
+/// Numbers of a plane that the sphere test needs in addition to its normal.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct SphereMargin {
     /// The normal's length, rounded up.
     pub length: f32,
     /// Margin per unit of [`Ball::reach`].
     pub slope: f32,
-    /// The plane's offset with the rest of the margin.
+    /// The plane's offset plus the rest of the margin.
     pub d: f32,
     /// Normal and offset divided by the length, rounded.
     pub unit: [f32; 4],
-    /// Distances from the plane that rounding may get wrong.
+    /// Distance from the plane that rounding may misjudge.
     ///
     /// Per unit of reach, for a reach of 0, and the largest reach without overflow.
     pub doubt: [f32; 3],
 }
 
 impl SphereMargin {
-    /// Roundings of u = 2^-24 that the margin is good for, each of the sum of
-    /// magnitudes `|n|_1 * reach + |d|` (reach bounds every coordinate of the
-    /// box and the centre, and the radius): 4 in the box test that must not be
-    /// contradicted, 6 in the sphere's dot product, 3 in `radius * length`, 2
-    /// between the centre of the cube and that of the sphere; 15 in all.
+    /// Roundings of u = 2^-24 that the margin covers.
+    ///
+    /// Each is relative to the sum of magnitudes `|n|_1 * reach + |d|` (reach bounds the radius and
+    /// every coordinate of the box and the centre): 4 in the box test that must not be
+    /// contradicted, 6 in the sphere's dot product, 3 in `radius * length`, 2 between the centre of
+    /// the cube and that of the sphere; 15 in all.
     const ROUNDINGS: f64 = 24.0;
-    /// Roundings between the sum over centre and radius for the plane of length 1 and
-    /// both tests of [`Spheres::drops`], of the sum `2 |n|_1 * reach + |d|`: 24 for the
-    /// margin above and 15 for what it covers, 4 from cube to sphere, 12 of the sum itself
-    /// and of the division.
+    /// Roundings between the sum for the unit plane and the tests of [`Spheres::drops`].
+    ///
+    /// Each is relative to `2 |n|_1 * reach + |d|`: 24 for the margin above and 15 for what it
+    /// covers, 4 from cube to sphere, 12 of the sum over centre and radius itself and of the
+    /// division.
     const OF_BOTH: f64 = 96.0;
 
     fn of(plane: &Plane) -> SphereMargin {
         const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
-        // Some times the smallest subnormal f32: products and halves that
-        // underflow.
+        // Some times the smallest subnormal f32: products and halves that underflow.
         const TINY: f64 = f64::from_bits((1023 - 145) << 52);
         let normal = plane.normal.as_dvec3();
         let size = normal.abs().element_sum();
@@ -133,10 +133,10 @@ impl SphereMargin {
         }
     }
 
-    /// The value of the sphere's farthest point, or a little more.
+    /// The value of the sphere's farthest point, or slightly more.
     ///
-    /// The ball is surely outside if it is a number below zero. An overflow on the way ends
-    /// in an infinity or a NaN, which is no such number.
+    /// The ball is certainly outside if this is a number below zero. An overflow yields an infinity
+    /// or a NaN, which is no such number.
     #[inline(always)]
     pub fn value_at(&self, normal: Vec3, ball: &Ball) -> f32 {
         let c = ball.centre;
@@ -147,24 +147,21 @@ impl SphereMargin {
 
 /// A volume that sees its items as spheres, given by [`sphere_cube`]s.
 ///
-/// A plane drops an item if the cube's p-vertex evaluates below zero or the
-/// sphere lies surely outside. No verdict about a node (over cubes, by the
-/// plane test) contradicts the verdict about an item in it, bit for bit:
+/// A plane drops an item if the cube's p-vertex evaluates below zero or the sphere is certainly
+/// outside. A verdict about a node (over cubes, by the plane test) never contradicts the verdict
+/// about an item in it, bit for bit:
 ///
-/// - A node outside a plane has only cubes outside it (the plane test is
-///   monotone), and those are dropped by the first clause; the sphere alone,
-///   with its margin, might let one pass.
-/// - A node inside a plane has an n-vertex of at least zero, and so have its
-///   cubes. Their p-vertices evaluate no lower. Nor do their spheres: the
-///   centre lies in the cube, so by the same monotony `n . c + d'` with
-///   `d' >= d` is not below the n-vertex's value, and what is added to it is
-///   not negative (or a NaN). Neither clause drops them.
+/// - A node outside a plane contains only cubes outside it (the plane test is monotone). The first
+///   clause drops those; the sphere alone, with its margin, might keep one.
+/// - A node inside a plane has an n-vertex of at least zero, and so have its cubes. Their
+///   p-vertices evaluate no lower. Nor do their spheres: the centre lies in the cube, so `n . c +
+///   d'` with `d' >= d` is monotone too and not below the n-vertex's value, and the term added to
+///   it is not negative (or a NaN). Neither clause drops them.
 ///
-/// And it loses nothing that [`ConvexVolume::sees`] with the same planes sees:
-/// the box lies in the cube, so where the cube's p-vertex evaluates below zero
-/// the box's does; and the sphere holds the box, so its farthest point lies at
-/// least as far along the normal as any of the box, and the margin covers
-/// every rounding of both tests (`SphereMargin::ROUNDINGS`).
+/// The volume loses nothing that [`ConvexVolume::sees`] with the same planes sees. The box lies in
+/// the cube, so if the cube's p-vertex evaluates below zero the box's does too. The sphere contains
+/// the box, so its farthest point lies at least as far along the normal as any point of the box,
+/// and the margin covers every rounding of both tests (`SphereMargin::ROUNDINGS`).
 #[derive(Clone, Debug)]
 pub struct Spheres {
     planes: ConvexVolume,
@@ -174,7 +171,7 @@ pub struct Spheres {
 }
 
 impl Spheres {
-    /// The spheres' view through the planes of a volume.
+    /// Prepares a volume's planes for the sphere test.
     pub fn new(planes: &ConvexVolume) -> Self {
         let mut margins = [SphereMargin::default(); MAX_PLANES];
         for (margin, plane) in margins.iter_mut().zip(planes.planes()) {
@@ -189,7 +186,7 @@ impl Spheres {
         spheres
     }
 
-    /// The planes in f32; what the sphere test adds to them is not in it.
+    /// The planes in f32, without the margins of the sphere test.
     #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
         &self.planes
@@ -197,7 +194,7 @@ impl Spheres {
 
     /// Plane `index` of a mask bit with its margin.
     ///
-    /// Without a check in the inner loop.
+    /// Without a bounds check in the inner loop.
     #[inline(always)]
     pub fn plane_of_bit(&self, index: u32) -> (&Plane, &SphereMargin) {
         let margin = &self.margins[index as usize % MAX_PLANES];
@@ -216,25 +213,26 @@ impl Spheres {
     }
 }
 
-/// The six planes of a view frustum as three sums in place of six.
+/// The six planes of a view frustum as three sums.
 ///
-/// The lesser of the distances from two planes is `s - |t|`, where s and t are half the sum
-/// and half the difference of both. For the planes of a symmetric frustum, s of each pair of
-/// sides is linear in t of near and far plane.
+/// The smaller of the distances from two planes is `s - |t|`, where s and t are half the sum and
+/// half the difference of the two. For a symmetric frustum, s of each pair of sides is linear in t
+/// of near and far plane.
 #[derive(Clone, Debug)]
 pub(super) struct FrustumSums {
     pub depth: [f32; 4],
     pub half_depth: f32,
-    /// Factor of the depth, offset, and t, of each pair of sides.
+    /// Factor of the depth, offset, and t, for each pair of sides.
     pub sides: [([f32; 2], [f32; 4]); 2],
 }
 
 impl FrustumSums {
-    /// Largest part of s that is not linear in the depth, per unit of coordinates: with
-    /// the roundings of the sums, less than half of [`Spheres::doubt`].
+    /// Largest part of s that is not linear in the depth, per unit of coordinates.
+    ///
+    /// Together with the roundings of the sums, less than half of [`Spheres::doubt`].
     const RESIDUAL: f64 = 3e-6;
 
-    /// `None` for other planes than those of a symmetric frustum with a far plane.
+    /// `None` unless the planes are those of a symmetric frustum with a far plane.
     pub fn of(spheres: &Spheres) -> Option<Self> {
         if spheres.planes().mask() != 0b11_1111 {
             return None;
@@ -273,7 +271,7 @@ mod tests {
 
     #[test]
     fn the_corner_of_a_cube_alone_is_not_enough() {
-        // Through the corner region of the cube, past the sphere.
+        // Through a corner region of the cube, past the sphere.
         let b = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
         let cube = sphere_cube(&b);
         let radius = 3f32.sqrt();
@@ -298,7 +296,7 @@ mod tests {
         ] {
             let cube = sphere_cube(&b);
             assert!(cube.is_finite() && cube.contains(&b));
-            // Close to the corner that the cut-off cube's own sphere lacks.
+            // Close to the corner that the clamped cube's own sphere does not reach.
             let plane = Plane::new(Vec3::splat(1e-3), -2.9e-3 * f32::MAX);
             let volume = ConvexVolume::from_planes(&[plane]).unwrap();
             assert!(volume.sees(&b) && !Spheres::new(&volume).drops(0, &cube));
@@ -307,7 +305,7 @@ mod tests {
         assert_eq!(sphere_cube(&empty), empty);
     }
 
-    /// Any size: a grid for ties, all exponents for the rest.
+    /// Any size: a grid for ties, all exponents for the others.
     fn number() -> impl Strategy<Value = f32> {
         prop_oneof![
             (-8i8..8).prop_map(f32::from),
@@ -334,13 +332,13 @@ mod tests {
             a in vector(), size in vector(), normal in vector(), scale in 0i32..24,
             free in number(), ulps in -20i32..20, touching: bool,
         ) {
-            // Down to far away and tiny: where rounding the cube matters.
+            // Down to far away and tiny, where rounding the cube matters.
             let b = a + size * 2f32.powi(-scale);
             prop_assume!(b.is_finite());
             let b = Aabb::new(a.min(b), a.max(b));
             let cube = sphere_cube(&b);
             prop_assert!(cube.is_finite() && cube.contains(&b));
-            // A plane that the box's far corner touches by a few ulps.
+            // A plane that the box's far corner touches up to a few ulps.
             let through = Plane::new(normal, 0.0);
             let d = -through.value_at(through.p_vertex(&b));
             let touches = f32::from_bits(d.to_bits().saturating_add_signed(ulps));

@@ -1,14 +1,13 @@
 //! Numbers, vectors and boxes for property tests.
 //!
-//! Those on which f32 arithmetic ties, overflows or vanishes, beside ordinary ones.
+//! Ordinary ones, and ones for which f32 arithmetic ties, overflows or underflows.
 
 use glam::Vec3;
 use proptest::prelude::*;
 
 use super::Aabb;
 
-/// Small integers (ties), ordinary numbers, all exponents (overflow), tiny ones
-/// and the other zero.
+/// Integers (ties), ordinary numbers, all exponents (overflow), tiny ones, -0.
 pub fn number() -> impl Strategy<Value = f32> {
     prop_oneof![
         (-8i8..8).prop_map(f32::from),
@@ -26,7 +25,7 @@ pub fn vector() -> impl Strategy<Value = Vec3> {
 }
 
 prop_compose! {
-    /// A box between two such points, each axis by itself.
+    /// A box between two such points, ordered axis by axis.
     pub fn any_box()(a in vector(), b in vector()) -> Aabb {
         Aabb::new(a.min(b), a.max(b))
     }
