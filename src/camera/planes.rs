@@ -84,11 +84,11 @@ impl Surroundings {
 impl Camera {
     /// The view volume in scene-local f32 coordinates.
     ///
-    /// With a positive epsilon c each plane is moved outward to `d' = round_up(d + c*u*(sum
-    /// |n_k|*x_k + |d|) + ...)`, u = 2^-24, where x is the worst visible point near enough to the
-    /// plane. This suffices: a box that meets the volume contains a point x of it, and the p-vertex
-    /// evaluates no lower than x (rounding is monotone); the error at x is less than the margin.
-    /// docs/NUMERICS.md has the proof.
+    /// With a positive epsilon c each plane is moved outward to
+    /// `d' = round_up(d + c*u*(sum |n_k|*x_k + |d|) + ...)`, u = 2^-24, where x is the worst
+    /// visible point near enough to the plane. This suffices: a box that meets the volume contains
+    /// a point x of it, and the p-vertex evaluates no lower than x (rounding is monotone); the
+    /// error at x is less than the margin. docs/NUMERICS.md has the proof.
     ///
     /// # Errors [`CameraError::Volume`] if a plane does not fit f32 (or the chosen method loses
     /// it); [`CameraError::Sums`] if a sum of the plane test could overflow within the

@@ -55,8 +55,8 @@ impl PlaneRows {
 
     /// The values at the p-vertices if `FAR`, else at the n-vertices.
     ///
-    /// The p-vertex needs no test of the normal's sign: rounding is monotone, so the larger of `n *
-    /// min` and `n * max` is `n` times its coordinate, up to the sign of a zero, which no
+    /// The p-vertex needs no test of the normal's sign: rounding is monotone, so the larger of
+    /// `n * min` and `n * max` is `n` times its coordinate, up to the sign of a zero, which no
     /// comparison distinguishes.
     // Loops instead of closures: what the compiler does not inline is not compiled for the
     // instruction set in use.

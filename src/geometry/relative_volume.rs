@@ -9,8 +9,8 @@ use super::{Aabb, ConvexVolume, Plane, PlaneF64, VolumeError};
 
 /// Planes in coordinates relative to an f32 eye.
 ///
-/// A box is translated by [`Aabb::relative_to`] and then gets THE plane test: `((nx*(x-ex) +
-/// ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
+/// A box is translated by [`Aabb::relative_to`] and then gets THE plane test:
+/// `((nx*(x-ex) + ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
 #[derive(Clone, Debug)]
 pub struct RelativeVolume {
     /// The eye in f32 scene coordinates, which is subtracted from every box.

@@ -97,7 +97,7 @@ impl SphereMargin {
     /// contradicted, 6 in the sphere's dot product, 3 in `radius * length`, 2 between the centre of
     /// the cube and that of the sphere; 15 in all.
     const ROUNDINGS: f64 = 24.0;
-    /// Roundings between the sum for the unit plane and the tests of [`Spheres::drops`].
+    /// Roundings from the sum for the unit plane to the tests of [`Spheres::drops`].
     ///
     /// Each is relative to `2 |n|_1 * reach + |d|`: 24 for the margin above and 15 for what it
     /// covers, 4 from cube to sphere, 12 of the sum over centre and radius itself and of the
@@ -154,9 +154,9 @@ impl SphereMargin {
 /// - A node outside a plane contains only cubes outside it (the plane test is monotone). The first
 ///   clause drops those; the sphere alone, with its margin, might keep one.
 /// - A node inside a plane has an n-vertex of at least zero, and so have its cubes. Their
-///   p-vertices evaluate no lower. Nor do their spheres: the centre lies in the cube, so `n . c +
-///   d'` with `d' >= d` is monotone too and not below the n-vertex's value, and the term added to
-///   it is not negative (or a NaN). Neither clause drops them.
+///   p-vertices evaluate no lower. Nor do their spheres: the centre lies in the cube, so
+///   `n . c + d'` with `d' >= d` is monotone too and not below the n-vertex's value, and the term
+///   added to it is not negative (or a NaN). Neither clause drops them.
 ///
 /// The volume loses nothing that [`ConvexVolume::sees`] with the same planes sees. The box lies in
 /// the cube, so if the cube's p-vertex evaluates below zero the box's does too. The sphere contains

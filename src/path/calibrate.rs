@@ -12,34 +12,33 @@ const MOST_ITEMS: usize = 8_000;
 const MOST_CAMERAS: usize = 128;
 /// Boxes tested per step of the search, unless sixteen cameras need more.
 ///
-/// The same number is tested for the warning that no view sees anything.
+/// The warning that all views are empty tests the same number.
 pub(super) const MOST_TESTS: usize = 160_000 * MOST_CAMERAS;
-/// Items of the sample that a camera sees at least, on average, at the cost of
-/// more items than that: a share of 0.02 % of eight thousand would be one or two.
+/// Least number of sampled items that a camera sees, on average.
+///
+/// The sample grows beyond [`MOST_ITEMS`] for it: 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
-/// Items that all cameras of the sample see, where that is no more work than
-/// [`MOST_TESTS`]: few cameras and a small share would be left to chance.
+/// Sampled items that all cameras together see, within [`MOST_TESTS`].
+///
+/// With few cameras and a small share, fewer would leave the result to chance.
 const SEEN_BY_ALL: f64 = 1_000.0;
 
-/// Far plane in near planes, at least, where near was named.
+/// Least far / near if near was given.
 const LEAST_DEPTH: f64 = 1.01;
 
-/// Largest ratio of the share that is reached to the one requested.
-///
-/// Three items instead of two.
+/// Largest ratio of the share found to the one requested: three items for two.
 const MOST_ABOVE: f64 = 1.5;
 
-/// Largest ratio, either way, of the shares that two samples of the items find.
+/// Largest ratio, either way, of the shares found in two samples of the items.
 const MOST_APART: f64 = 1.2;
 
 /// The scale of far at which `share` of the items is visible on average.
 ///
-/// Within the sample's accuracy. A near that is a thousandth of far is scaled with it.
+/// Within the sample's accuracy. A near that is a thousandth of far is scaled too.
 ///
-/// # Errors
-/// A share that even four times the present far plane does not reach, or that is less
-/// than what is visible at once.
+/// # Errors A share not reached even at four times the present far plane, or smaller than any share
+/// that can be reached.
 pub(super) fn for_visible_share(
     path: &str,
     scene: &Scene,
@@ -76,7 +75,7 @@ pub(super) fn for_visible_share(
     };
     let search = |items: &[Aabb]| {
         let mut low = 1e-4;
-        // A near that grows with far loses what is close, so a smaller scale may show more.
+        // A near that grows with far loses close items, so a smaller scale may show more.
         let (mut high, mut most) = (4.0, visible(items, 4.0)?);
         let mut largest = most;
         while most < share && high > 4.0 * low {
@@ -113,7 +112,7 @@ pub(super) fn for_visible_share(
     if regular.len() == scene.items.len() {
         return found;
     }
-    // Files that repeat themselves may have one kind of item at every n-th place.
+    // Periodic files may have one kind of item at every n-th index.
     let scattered = scattered(scene.items.len(), regular.len());
     let scattered: Vec<Aabb> = scattered.map(|item| scene.items[item]).collect();
     let share_of = |scale: &f64| visible(&scattered, *scale).ok();
@@ -123,12 +122,12 @@ pub(super) fn for_visible_share(
     }
 }
 
-/// Most cameras of a sample with that many items.
+/// Most cameras of a sample with this number of items.
 pub(super) fn most_cameras(items: usize) -> usize {
     (MOST_TESTS / items.max(1)).clamp(16, MOST_CAMERAS)
 }
 
-/// The cameras with far scaled, and near where it is a thousandth of far.
+/// The cameras with far scaled, and near too if it is a thousandth of far.
 pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<Camera>> {
     let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
     scaled.collect::<Result<_, _>>().map_err(|e| unfit(path, e))
@@ -139,7 +138,7 @@ fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
     if let LensKind::Matrix(_) = lens.kind() {
         return Ok(*camera);
     }
-    // An infinite far plane is replaced: its near stood at far/1000.
+    // An infinite far plane is replaced by near * 1000.
     let far = lens.far().unwrap_or(lens.near() * 1000.0);
     let is_named = lens.far().is_some() && lens.near() != far / 1000.0;
     let scaled = far * scale;

@@ -1,6 +1,6 @@
-//! Lenses of cameras as used, matrices as read, and doubts about cameras.
+//! Lenses of cameras as used, matrices as read, and warnings about cameras.
 //!
-//! Doubts are another up axis, broken matrices, eyes far outside, empty views.
+//! Warnings are about another up axis, wrongly read matrices, eyes far outside, empty views.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -12,11 +12,11 @@ use crate::input::note;
 use crate::scene::{Scene, UpAxis};
 use crate::shown::{counted, significant};
 
-/// Lenses of all cameras. Pairs are the least and the largest value.
+/// Lenses of all cameras; pairs are the smallest and the largest value.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CameraFacts {
-    /// Vertical field of view, degrees; null where all lenses are orthographic.
+    /// Vertical field of view, degrees; null if all lenses are orthographic.
     pub fovy_deg: Option<[f64; 2]>,
     /// Height of the view of orthographic lenses, world units.
     pub ortho_height: Option<[f64; 2]>,
@@ -24,13 +24,13 @@ pub struct CameraFacts {
     pub aspect: Option<[f64; 2]>,
     /// Distance of the near plane; null without cameras.
     pub near: Option<[f64; 2]>,
-    /// Distance of the far plane; null for none.
+    /// Distance of the far plane; null if infinite.
     pub far: [Option<f64>; 2],
     /// How matrices were read; null for cameras with an eye and a lens.
     pub matrix: Option<MatrixFacts>,
 }
 
-/// First matrix of a path, taken apart.
+/// Decomposition of a path's first matrix.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct MatrixFacts {
@@ -55,12 +55,14 @@ pub struct MatrixFacts {
     pub is_mirrored: bool,
 }
 
-/// A camera, and what its matrix was made of.
+/// A camera and the decomposition of its matrix.
 ///
 /// `None` for other cameras and for a matrix without a lens.
 type Taken<'a> = (&'a Camera, Option<Box<Unprojected>>);
 
-/// Matrices as frames and lenses, computed exactly: once for all facts and doubts.
+/// Decomposes matrices into frames and lenses, once for all facts and warnings.
+///
+/// Computed exactly.
 pub fn taken_apart(cameras: &[Camera]) -> Vec<Taken<'_>> {
     let of = |camera: &Camera| Some(Box::new(camera.lens.matrix()?.unprojected().ok()?));
     cameras.iter().map(|camera| (camera, of(camera))).collect()
@@ -71,7 +73,7 @@ impl CameraFacts {
     pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
         let taken = taken_apart(cameras);
         let one = |(camera, found): &Taken| {
-            // Of a matrix without a lens the matrix itself.
+            // For a matrix without a lens, the matrix itself.
             let own = |found: &Unprojected| found.camera.lens;
             let lens = found.as_deref().map_or(camera.lens, own);
             let height = lens.height_at(1.0).filter(|_| lens.is_orthographic());
@@ -135,14 +137,14 @@ impl MatrixFacts {
 
 /// Returns whether y points down in the images of matrices (Vulkan).
 ///
-/// The up axis of their scene decides: an image is mirrored in a left-handed world too.
-/// Cameras that look straight down are for neither, and OpenGL has y upward.
+/// The up axis of the scene decides, since an image is also mirrored in a left-handed world.
+/// Cameras that look straight down prove neither, and OpenGL has y upward.
 pub fn is_downward(taken: &[Taken], up: UpAxis) -> bool {
     let mut matrices = taken.iter().filter_map(|(camera, _)| camera.lens.matrix());
     matrices.all(ViewProjection::is_from_zero) && upward(taken, up) < -SLANTED
 }
 
-/// Mean of the y axes of mirrored images along the up axis; NaN without such.
+/// Mean of the y axes of mirrored images along the up axis; NaN without any.
 fn upward(taken: &[Taken], up: UpAxis) -> f64 {
     let found = taken.iter().filter_map(|(_, found)| found.as_ref());
     let mirrored = found.filter(|found| found.is_mirrored);
@@ -151,7 +153,7 @@ fn upward(taken: &[Taken], up: UpAxis) -> f64 {
     sum / count
 }
 
-/// Sine of the angle to straight up or down that decides which axis is up.
+/// Sine of the least angle to straight up or down at which the up axis is clear.
 const SLANTED: f64 = 0.1;
 
 /// Vertical angle of view in degrees, and width / height.
@@ -168,13 +170,13 @@ fn shape(lens: &Lens) -> [Option<f64>; 2] {
     }
 }
 
-/// Scene diagonals from the scene to an eye that is far outside.
+/// Distance, in scene diagonals, beyond which an eye is far outside.
 const FAR_OUTSIDE: f64 = 3.0;
 
-/// One line for each kind of doubt about the cameras of a path.
+/// One line for each kind of warning about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
     let (taken, told) = (taken_apart(cameras), |doubt| format!("{path}: {doubt}"));
-    // The axes and the eye of a matrix that is read wrongly are no camera's.
+    // Axes and eye of a matrix that is read wrongly mean nothing.
     if let Some(only) = transposed(&taken) {
         return vec![told(only)];
     }
@@ -193,7 +195,7 @@ pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
 }
 
 impl LensDefaults {
-    /// Tells of what is given and has no effect on the cameras of a path.
+    /// Warns of options that have no effect on the cameras of a path.
     pub(super) fn note_unused(&self, path: &CameraPath) {
         let names = ["--fovy", "--aspect", "--near", "--far"];
         let endless = |far: Option<f64>| far.unwrap_or(f64::INFINITY);
@@ -224,14 +226,15 @@ fn share<T>(part: usize, cameras: &[T]) -> String {
     format!("{part} of {}", counted(cameras.len(), "camera"))
 }
 
-/// The share of the cameras that are of a kind, if any is.
+/// The number of the cameras of a kind, if there are any.
 fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
     let count = cameras.iter().filter(is_one).count();
     (count > 0).then(|| share(count, cameras))
 }
 
-/// View matrices without a projection, which see two units of width and height, and
-/// projections without a view.
+/// View matrices without a projection, and projections without a view.
+///
+/// A view matrix alone sees two units of width and height.
 fn bare(cameras: &[Camera]) -> Option<String> {
     let is_lone = |camera: &Camera| camera.lens.matrix().is_some_and(ViewProjection::is_lone);
     if cameras.len() > 1 && cameras.iter().all(is_lone) {
@@ -245,7 +248,7 @@ fn bare(cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// Perspectives all of which are so narrow that their angle may be in radians.
+/// Perspectives so narrow that their angles may be in radians, if all are.
 fn narrow(cameras: &[Camera]) -> Option<String> {
     let is_narrow = |camera: &Camera| shape(&camera.lens)[0].is_some_and(|fovy| fovy < 2.0);
     let is_doubtful = !cameras.is_empty() && cameras.iter().all(is_narrow);
@@ -255,7 +258,7 @@ fn narrow(cameras: &[Camera]) -> Option<String> {
 
 /// Orthographic matrices whose view would look down if near and far were swapped.
 fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
-    // Lights and maps are seen from above.
+    // Lights and maps look from above.
     let is_doubtful = |camera: &&Camera| {
         let is_matrix = camera.lens.matrix().is_some() && camera.lens.is_orthographic();
         is_matrix && camera.frame.forward().dot(scene.up.vector()) > -0.1
@@ -281,13 +284,13 @@ fn rolled(scene: &Scene, taken: &[Taken]) -> Option<String> {
     let all: Vec<(DVec3, DVec3, bool)> = taken.iter().filter_map(axes).collect();
     let against = |axis: UpAxis, (u, v, is_mirrored): &(DVec3, DVec3, bool)| {
         let [across, along] = [u, v].map(|own| own.dot(axis.vector()));
-        // Straight up or down there is no roll.
+        // A view straight up or down has no roll.
         let is_known = across.hypot(along) > SLANTED;
         let along = if *is_mirrored { along.abs() } else { along };
         is_known.then_some((across.abs(), along))
     };
     let is_rolled = |axes: &&_| against(scene.up, axes).is_some_and(|(a, b)| b < a);
-    // Of a camera that is not rolled the horizon is level.
+    // The horizon of a camera that is not rolled is level.
     let is_level = |axis, axes: &_| against(axis, axes).is_some_and(|(a, b)| a < 0.1 && b > 0.0);
     let rolled = || all.iter().filter(is_rolled);
     let (first, own) = (rolled().next()?.1, scene.up.name());
@@ -304,14 +307,14 @@ fn rolled(scene: &Scene, taken: &[Taken]) -> Option<String> {
     };
     let count = all.iter().filter(|axes| is_level(other, axes)).count();
     let (what, other, name) = (share(count, taken), other.name(), &scene.name);
-    // Formats that state an axis state a unit as well.
+    // Formats that define an axis define a unit as well.
     let is_advised = scene.unit.is_none() && 2 * count >= taken.len();
     let advice = is_advised.then(|| format!("; --up {other} if it is the scene's"));
     let advice = advice.unwrap_or_default();
     Some(format!("{other} is up in {what}, {own} in {name}{advice}"))
 }
 
-/// Matrices that never reach depth -1: of depths from 0 to 1, reversed.
+/// Matrices that never reach depth -1: probably reversed, with depths from 0 to 1.
 fn shallow(taken: &[Taken]) -> Option<String> {
     let is_shallow = |one: &&Taken| {
         let Camera { frame, lens } = one.0;
@@ -328,12 +331,12 @@ fn shallow(taken: &[Taken]) -> Option<String> {
     ))
 }
 
-/// Returns whether a matrix has no right angles as it is read.
+/// Returns whether a matrix, as it is read, has no right angles.
 fn is_sheared((_, found): &&Taken) -> bool {
     found.as_ref().is_some_and(|found| found.is_sheared())
 }
 
-/// Matrices that are no camera's, where all their transposes are.
+/// Matrices that are no camera's, if all their transposes are.
 fn transposed(taken: &[Taken]) -> Option<String> {
     let sheared = taken.iter().filter(is_sheared);
     let mut sheared = sheared.filter_map(|(camera, _)| camera.lens.matrix());
@@ -360,10 +363,10 @@ fn sheared(taken: &[Taken]) -> Option<String> {
     ))
 }
 
-/// Matrices of a left-handed world beside a scene whose format is right-handed.
+/// Matrices of a left-handed world with a scene whose format is right-handed.
 fn left_handed(scene: &Scene, taken: &[Taken]) -> Option<String> {
     let is_right_handed = scene.unit.is_some() || scene.surfaces.is_some();
-    // Which end of depth is near is not known of parallel rays, and decides it.
+    // For parallel rays the near end of depth is unknown, and it decides this.
     let is_mirrored = |(camera, found): &Taken| {
         let found = found.as_ref().filter(|_| !camera.lens.is_orthographic());
         found.is_some_and(|found| found.is_mirrored)
@@ -377,19 +380,19 @@ fn left_handed(scene: &Scene, taken: &[Taken]) -> Option<String> {
 fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let bounds = scene.world_bounds();
     let diagonal = (bounds.max - bounds.min).length();
-    // Paths about a point go as if its diagonal were 2.
+    // Paths about a point treat its diagonal as 2.
     let diagonal = if diagonal > 0.0 { diagonal } else { 2.0 };
     let outside = |camera: &Camera| {
         let eye = camera.frame.eye;
         let away = eye - eye.clamp(bounds.min, bounds.max);
-        // Squares may be more than f64 holds.
+        // Squares may overflow f64.
         let distance = away.to_array().into_iter().fold(0.0, libm::hypot);
-        // Parallel lines of sight begin anywhere.
+        // Parallel lines of sight may start anywhere.
         (distance > FAR_OUTSIDE * diagonal && !camera.lens.is_orthographic())
             .then_some(distance / diagonal)
     };
     let far: Vec<f64> = cameras.iter().filter_map(outside).collect();
-    // A scene of no items is nowhere.
+    // A scene without items has no position.
     let farthest = far.iter().copied().reduce(f64::max);
     let farthest = farthest.filter(|_| !scene.items.is_empty())?;
     Some(format!(
@@ -401,7 +404,7 @@ fn far_outside(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     ))
 }
 
-/// Views that all miss all items; of large scenes fewer views.
+/// The warning that no view sees an item; samples views for large scenes.
 fn blind(scene: &Scene, cameras: &[Camera]) -> Option<String> {
     let most = (MOST_TESTS / scene.items.len().max(1)).max(1);
     let sample = every_nth(cameras, most);

@@ -1,6 +1,4 @@
-//! Generated paths, one function per family.
-//!
-//! `street` and `walk` have files of their own.
+//! Generated paths, one function per family; `street` and `walk` have files.
 
 use glam::DVec3;
 
@@ -11,7 +9,7 @@ use crate::scene::{CameraPlace, PlaceView, on_sphere};
 use crate::shown::counted;
 use crate::spec::Spec;
 
-/// A circle about the scene: everything turns past.
+/// A circle about the scene: all items pass by.
 ///
 /// `radius` is in half diagonals, `height` (of the eye above the centre) in radii.
 pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
@@ -25,8 +23,9 @@ pub(super) fn orbit(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     Ok(stage.turns().map(pose).collect())
 }
 
-/// A closed flight through `waypoints` seeded points within the scene's middle: the
-/// coherent path of a game or a film camera.
+/// A closed flight through `waypoints` seeded points in the middle of the scene.
+///
+/// The coherent path of a game or a film camera.
 pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let count = spec.whole("waypoints", 8, 4..=10_000)? as usize;
     let mut rng = stage.rng();
@@ -40,7 +39,7 @@ pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let pose = |turn: f64| {
         let at = turn * count as f64;
         let eye = spline(&points, at);
-        // Slightly downward, as a pilot looks.
+        // Slightly downward, like a pilot.
         let ahead = (spline(&points, at + step) - eye) / step;
         let forward = ahead - DVec3::Z * 0.15 * ahead.length();
         let moving = forward.length() > 1e-9 * stage.radius();
@@ -49,9 +48,10 @@ pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     Ok(stage.turns().map(pose).collect())
 }
 
-/// A closed centripetal Catmull-Rom spline at `at` (segment number plus
-/// fraction), by the pyramid of Barry and Goldman 1988; no loops and no cusps
-/// within a segment (Yuksel et al. 2011).
+/// A closed centripetal Catmull-Rom spline at `at` (segment number plus fraction).
+///
+/// Evaluated by the pyramid of Barry and Goldman 1988; without loops or cusps within a segment (Yuksel et al.
+/// 2011).
 fn spline(points: &[DVec3], at: f64) -> DVec3 {
     let n = points.len();
     let segment = at.floor();
@@ -71,7 +71,7 @@ fn spline(points: &[DVec3], at: f64) -> DVec3 {
     mix(b[0], b[1], 1, 2)
 }
 
-/// A turn in place by the camera's own yaw: the eye rests, the view changes.
+/// A turn in place by the camera's own yaw: the eye is fixed, the view changes.
 pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let eye = stage.centre().with_z(stage.flight_level(0.3));
     let level = Frame::looking_along(eye, DVec3::X, DVec3::Z);
@@ -85,16 +85,16 @@ pub(super) fn spin(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     Ok(poses.collect())
 }
 
-/// The lecture's zoom in both of its senses.
+/// The lecture's zoom in both senses.
 ///
-/// The eye moves along the look, then rests while the field of view narrows. `power` is
-/// the magnification at the end.
+/// The eye moves along the direction of view, then stays while the field of view narrows. `power`
+/// is the final magnification.
 pub(super) fn zoom(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let power = spec.number_between("power", 8.0, 1.0, 1e6)?;
     let forward = DVec3::new(0.8, 0.5, -0.3).normalize();
     let from = stage.centre() - forward * stage.radius();
     let pose = |t: f64| {
-        // From the rim to a tenth of the way before the centre.
+        // From the rim 90 % of the way to the centre.
         let travelled = (2.0 * t).min(1.0) * 0.9 * stage.radius();
         let magnification = libm::pow(power, (2.0 * t - 1.0).max(0.0));
         Pose {
@@ -120,9 +120,10 @@ pub(super) fn teleport(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     Ok(poses.collect())
 }
 
-/// The whole scene from outside: everything is visible, so the cost of the answer
-/// itself shows. Eyes on a Fibonacci spiral over the sphere, far enough away for any
-/// field of view above 30 degrees to take in the scene's bounding sphere.
+/// The whole scene from outside: all is visible, so the cost of the answer shows.
+///
+/// Eyes on a Fibonacci spiral over the sphere, far enough away that any field of view above 30
+/// degrees contains the scene's bounding sphere.
 pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     // 1/sin(15 degrees) = 3.86 radii.
@@ -137,7 +138,7 @@ pub(super) fn outside(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
 
 /// The scene's own camera places: things of Doom maps, cameras of glTF.
 ///
-/// Roll and lens are the file's, where it states them. `frames` of them at most.
+/// Roll and lens are the file's, if it states them. At most `frames` of them.
 pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     if stage.scene.places.is_empty() {
         let wanted = "expected one with places: a Doom map, a glTF with cameras";
@@ -164,7 +165,7 @@ pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
     }
 }
 
-/// The camera that the animation of a scene's file moves, at even times.
+/// The camera moved by the animation of a scene's file, at even times.
 pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     let unfit = |reason: String| unfit("animation", reason);
     let animation = match stage.scene.animation.as_deref() {
@@ -192,7 +193,7 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     times.map(pose).collect()
 }
 
-/// Times from the first to the last key, both of them exact.
+/// Times from the first to the last key, both exact.
 fn even_times([first, last]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
     let steps = count.saturating_sub(1).max(1) as f64;
     // Exact products of f32 times, so that the last time is the last key's.

@@ -25,7 +25,7 @@ pub use facts::{CameraFacts, MatrixFacts};
 pub(crate) use facts::{is_downward, taken_apart, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
-/// The path through a scene when none is named.
+/// The path through a scene if none is named.
 pub(crate) const DEFAULT_PATH: &str = "flythrough";
 
 /// A named sequence of cameras.
@@ -35,13 +35,13 @@ pub struct CameraPath {
     pub name: String,
     /// Cameras, in the order of the path.
     pub cameras: Vec<Camera>,
-    /// The line of each camera in the file that it was read from; empty for a spec.
+    /// Line of each camera in its file; empty for a spec.
     pub lines: Vec<u64>,
-    /// Times of all cameras of the file in seconds, ascending; empty if one has none.
+    /// Times of all cameras of the file in seconds, ascending; empty if one is missing.
     pub times: Vec<f64>,
     /// Scale of far that `visible=` has found.
     pub lens_scale: Option<f64>,
-    /// Cameras of the whole path that are not among these.
+    /// Number of cameras of the whole path that are not among these.
     pub left_out: usize,
 }
 
@@ -58,10 +58,9 @@ impl CameraPath {
 
     /// The path with far planes scaled so that a share of the items is visible.
     ///
-    /// A known scale is not searched for.
+    /// A known `scale` is used instead of a search.
     ///
-    /// # Errors
-    /// A share that no scale reaches.
+    /// # Errors A share that no scale reaches.
     pub fn seeing(mut self, scene: &Scene, share: f64, scale: Option<f64>) -> Result<CameraPath> {
         let find = || calibrate::for_visible_share(&self.name, scene, &self.cameras, share);
         let scale = scale.map_or_else(find, Ok)?;
@@ -85,27 +84,27 @@ pub(crate) fn evenly(count: usize, most: usize) -> impl Iterator<Item = usize> +
     (0..chosen).map(move |n| n * count / chosen)
 }
 
-/// At most `most` of `count` indices, from hashed places in equal parts.
+/// At most `most` of `count` indices, one at a hashed position in each equal part.
 ///
-/// The first of them are from all over, too.
+/// Any prefix is spread over all indices, too.
 pub(crate) fn scattered(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let chosen = count.min(most);
     (0..chosen as u64).map(move |n| {
-        // A prime, some 0.62 of 2^32.
+        // A prime, about 0.62 * 2^32.
         let part = (n * 0x9E37_79B1 % chosen as u64) as usize;
         let [begin, end] = [part, part + 1].map(|part| part * count / chosen);
         begin + mix64(part as u64) as usize % (end - begin)
     })
 }
 
-/// Keeps `most` of more.
+/// Keeps `most` elements, evenly spread.
 fn thin<T: Copy>(all: &mut Vec<T>, most: usize) {
     *all = evenly(all.len(), most).map(|n| all[n]).collect();
 }
 
 /// SHA-256 over frames and lenses. O(n).
 ///
-/// Paths with the same digest have the same answers in a scene.
+/// Paths with equal digests have equal answers in a scene.
 pub fn digest(cameras: &[Camera]) -> String {
     let mut hash = hmac_sha256::Hash::new();
     let mut add = |value: f64| hash.update(value.to_bits().to_le_bytes());
@@ -113,8 +112,8 @@ pub fn digest(cameras: &[Camera]) -> String {
         for axis in [frame.eye, frame.u(), frame.v(), frame.n()] {
             axis.to_array().into_iter().for_each(&mut add);
         }
-        // The kind of the lens first. No far plane is an infinite one, which no lens can
-        // have otherwise.
+        // The kind of the lens first. An infinite distance stands for no far plane; no lens can
+        // have it otherwise.
         let depths = [lens.near(), lens.far().unwrap_or(f64::INFINITY)];
         let lens = match *lens.kind() {
             LensKind::Perspective { fovy_deg, aspect } => {
@@ -170,14 +169,14 @@ pub const PATH_PARAMS: &str = "frames=256, seed=1 (of random choices), fovy=60 (
      far=from the farthest eye to the centre and half the diagonal more (or inf), visible (choose far so that the six-plane test returns this share of the items on average, \
      false positives included, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
-/// The error of a path that a scene cannot have: what was found and expected.
+/// The error of a path that a scene cannot have: found and expected.
 fn unfit(path: &str, reason: impl Display) -> InputError {
     InputError::new(format_args!("path '{path}': {reason}"))
 }
 
 /// Scene, length and seed of a path.
 ///
-/// Coordinates, also of poses, have z up: [`UpAxis::to_z_up`].
+/// Coordinates, those of poses included, have z up: [`UpAxis::to_z_up`].
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
     bounds: WorldBox,
@@ -185,8 +184,9 @@ pub(crate) struct Stage<'a> {
     seed: u64,
 }
 
-/// One camera without its far plane decided. `magnification` divides the
-/// window (zoom by field of view).
+/// A camera whose far plane is not decided yet.
+///
+/// `magnification` divides the window (zoom by field of view).
 #[derive(Clone, Copy)]
 pub(crate) struct Pose {
     eye: DVec3,
@@ -227,7 +227,7 @@ impl Stage<'_> {
         if half > 0.0 { half } else { 1.0 }
     }
 
-    /// A height range to fly in: inside the scene, or above it if it is flat.
+    /// A height to fly at: inside the scene, or above it if it is flat.
     fn flight_level(&self, share: f64) -> f64 {
         let width = self.extent().x.max(self.extent().y);
         self.bounds.min.z + share * self.extent().z.max(0.1 * width)
@@ -252,23 +252,21 @@ impl Scene {
     }
 }
 
-/// Makes or reads a path: `orbit:frames=512`, or a cameras CSV.
+/// Generates or reads a path: `orbit:frames=512`, or a cameras CSV.
 ///
-/// An existing file wins over a name.
+/// An existing file takes precedence over a name.
 ///
-/// # Errors
-/// One line that names what was found and what was expected.
+/// # Errors One line that names what was found and what was expected.
 pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath> {
     load_scaled(source, scene, defaults, None)
 }
 
 /// [`load`] with a known scale of the lens.
 ///
-/// The scale is the one that an earlier load of this path has found
-/// ([`CameraPath::lens_scale`]); it is not searched again.
+/// The scale that an earlier load of this path has found ([`CameraPath::lens_scale`]); no new
+/// search.
 ///
-/// # Errors
-/// The errors of [`load`].
+/// # Errors The errors of [`load`].
 pub fn load_scaled(
     source: &str,
     scene: &Scene,
@@ -320,15 +318,15 @@ fn read(
     }
 }
 
-/// Refuses more cameras than there is memory for.
+/// Refuses more cameras than fit in memory.
 fn fits(source: &str, cameras: u64) -> Result<()> {
-    /// Bytes of a camera with its views and answers: 2,800 were measured.
+    /// Bytes of a camera with its views and answers: 2,800 measured.
     const PER_CAMERA: u64 = 3000;
     let label = format!("path '{source}', {cameras} cameras");
     memory::check_fits(&label, cameras.saturating_mul(PER_CAMERA), 0, cameras)
 }
 
-/// Cameras at poses with the lens of a spec, and the share of items to be visible.
+/// Cameras at poses with the lens of a spec, and the requested visible share.
 fn cameras_at(
     path: &str,
     spec: &mut Spec,
@@ -336,7 +334,7 @@ fn cameras_at(
     stage: &Stage,
     poses: &[Pose],
 ) -> Result<(Vec<Camera>, Option<f64>)> {
-    // From the farthest eye everything up to the far side is in reach.
+    // Far enough to reach the far side of the scene from the farthest eye.
     let farthest = poses.iter().map(|p| (p.eye - stage.centre()).length());
     let natural = farthest.fold(0.0, f64::max) + stage.radius();
     let visible = spec.text("visible");
@@ -353,11 +351,11 @@ fn cameras_at(
     let far = far.filter(|far| *far <= FARTHEST);
     let near = match spec.text("near") {
         Some(_) => Some(spec.number("near", 0.0)?),
-        // Items may be an arm's length away from an eye among them.
+        // Items may be at arm's length from an eye between them.
         None if spec.name() == "street" => defaults.near.or(Some(0.1)),
         None => defaults.near,
     };
-    // A near plane that follows from it would be named in its place.
+    // Otherwise the error would name the near plane that follows from far.
     if let Some(far) = far.filter(|far| near.is_none() && far / 1000.0 <= 0.0) {
         return Err(SpecError::new(format_args!(
             "in '{}': far is {far:?}; expected a number above 0 (or inf)",
@@ -374,7 +372,7 @@ fn cameras_at(
     let near = near.unwrap_or(far.unwrap_or(natural).min(natural) / 1000.0);
     let visible = visible.transpose()?;
     spec.finish()?;
-    // That of a place where no parameters replace it; a share of items replaces far.
+    // The lens of the place, unless parameters replace it; a requested share replaces far.
     let lens = |own: Option<PlaceView>| -> Result<Lens, CameraError> {
         let Some(own) = own else {
             return Lens::perspective(fovy_deg, aspect, near, far);
@@ -414,15 +412,16 @@ fn cameras_at(
     Ok((numbered.collect::<Result<_>>()?, visible))
 }
 
-/// `visible=2%` is a share of the items, `visible=2000` a count of them; 1 would
-/// be both and is neither.
+/// Parses `visible=2%`, a share of the items, or `visible=2000`, a count of them.
+///
+/// 1 would be ambiguous and is refused.
 fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecError> {
     let value = spec.number("visible", 0.0)?;
     if value > 0.0 && value < 1.0 && items > 0 {
         return Ok(value);
     }
-    // 200 % are a share that is none, not two items. All of them cannot be
-    // calibrated for: there is a path for that.
+    // 200 % is neither a valid share nor two items. All items cannot be calibrated for: there is a
+    // path for that.
     if !text.ends_with('%') && value > 1.0 && value.fract() == 0.0 && value < items as f64 {
         return Ok(value / items as f64);
     }

@@ -12,7 +12,7 @@ use crate::scene::{Scene, WorldBox, memory};
 use crate::shown::shortened;
 
 defaults! {
-    /// Values for columns that a file does not have, and lenses of generated paths.
+    /// Values for missing columns of a file, and lenses of generated paths.
     ///
     /// `None` leaves the choice to the path.
     #[derive(Clone, Copy, PartialEq, Debug)]
@@ -25,13 +25,13 @@ defaults! {
         pub near: Option<f64> = None,
         /// `Some(None)` is an infinite far plane.
         pub far: Option<Option<f64>> = None,
-        /// Vector that is up in the image; [`load`](super::load) takes the scene's.
+        /// Up vector in the image; [`load`](super::load) takes the scene's.
         pub up: DVec3 = DVec3::Z,
         /// Middle of the scene; set by [`load`](super::load).
         pub middle: DVec3 = DVec3::ZERO,
         /// Twice the scene's diagonal; set by [`load`](super::load).
         pub reach: f64 = 1000.0,
-        /// How files are to be read whose cameras are matrices.
+        /// Convention for reading files of matrices.
         pub matrix: Option<MatrixConvention> = None,
     }
 }
@@ -47,21 +47,21 @@ impl LensDefaults {
 
     /// Near and far plane of a recorded camera without either.
     ///
-    /// Far is twice the scene's diagonal, or the far side of the scene from an eye
-    /// farther outside; near is a thousandth of the nearer of far and that diagonal's double.
+    /// Far is twice the scene's diagonal, or the far side of the scene if the eye is farther
+    /// outside; near is a thousandth of far or of twice the diagonal, whichever is smaller.
     pub fn depths(&self, eye: DVec3) -> (f64, Option<f64>) {
         let side = eye.distance(self.middle) + self.reach / 4.0;
         let far = self.far.unwrap_or(Some(side.max(self.reach).min(FARTHEST)));
         (self.near.unwrap_or_else(|| self.near_of(far)), far)
     }
 
-    /// Near plane of a recorded camera whose far plane may lie far behind the scene.
+    /// Near plane of a recorded camera whose far plane may lie far beyond the scene.
     fn near_of(&self, far: Option<f64>) -> f64 {
         let far = far.filter(|far| *far > 0.0).unwrap_or(f64::INFINITY);
         far.min(self.reach) / FAR_IN_NEARS
     }
 
-    /// The same with up axis and size of a scene.
+    /// The same defaults with up axis and size of a scene.
     pub fn of_scene(&self, scene: &Scene) -> LensDefaults {
         let WorldBox { min, max } = scene.world_bounds();
         let diagonal = (max - min).length();
@@ -75,25 +75,23 @@ impl LensDefaults {
     }
 }
 
-/// The far plane in near planes, for cameras without a near plane.
+/// far / near for cameras without a near plane.
 const FAR_IN_NEARS: f64 = 1000.0;
 
 /// Reads a cameras CSV: poses, or view-projection matrices.
 ///
 /// Poses: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`, and any of `up_*`, `fovy_deg`,
-/// `aspect`, `near`, `far` (empty or `inf` = infinite), `ortho_height` (world units: the
-/// lens is orthographic, `fovy_deg` empty; empty: perspective). Matrices: `m00,m01,..,m33`
-/// (row, column) and nothing of the others. Times in `time_s` must ascend; an empty one is
-/// not known. Columns in any order; a note names those that are not read, but for labels
-/// such as `name`.
+/// `aspect`, `near`, `far` (empty or `inf` = infinite), `ortho_height` (world units: the lens is
+/// orthographic, `fovy_deg` empty; empty: perspective). Matrices: `m00,m01,..,m33` (row, column)
+/// and none of the others. Times in `time_s` must ascend; an empty one is unknown. Columns in any
+/// order; a note names unread ones, except labels such as `name`.
 ///
-/// # Errors
-/// The line of the first value that is no number or makes no camera, or of a time before
-/// the last one; a file without cameras; matrices without a convention, or beside an eye or a lens; both a
-/// place to look at and a direction.
+/// # Errors The line of the first value that is not a number or gives no valid camera, or of a time
+/// before the last one; a file without cameras; matrices without a convention, or with an eye or a
+/// lens; both a place to look at and a direction.
 pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Result<CameraPath> {
     let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
-    // Other names, as `_11`, where a convention is given: the error is about matrices.
+    // With a convention also for other names, such as `_11`: the error is then about matrices.
     let has = |names: &[&str]| names.iter().any(|name| table.column(name).is_some());
     let is_matrix = has(&MATRIX_ENTRIES) || defaults.matrix.is_some() && !has(&OF_EYES);
     let read: CameraReader = match is_matrix {
@@ -132,10 +130,10 @@ pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Re
 /// Makes the camera of a row, from the columns of one kind of file.
 type CameraReader<'a> = Box<dyn Fn(&Row) -> Result<Camera> + 'a>;
 
-/// Bytes of a row in what callers make of it, such as views.
+/// Bytes that callers derive from a row, such as views.
 const BESIDE: usize = 64;
 
-/// All rows of a table, of which there must be one.
+/// All rows of a table, at least one.
 fn rows<T>(
     table: &mut TableReader,
     file: &str,
@@ -144,7 +142,7 @@ fn rows<T>(
 ) -> Result<Vec<T>> {
     let mut found: Vec<T> = Vec::new();
     while let Some(row) = table.next_row() {
-        // How long a pipe is shows as it is read.
+        // The length of a pipe is unknown until it is read.
         if found.len() == found.capacity() {
             let needed = 2 * found.capacity() * (size_of::<T>() + BESIDE);
             memory::check_fits(file, needed as u64, 0, found.len() as u64)?;
@@ -155,7 +153,7 @@ fn rows<T>(
     Ok(found)
 }
 
-/// The error of a row whose numbers make no camera.
+/// The error of a row whose numbers give no valid camera.
 fn refused(row: &Row, error: CameraError) -> InputError {
     match error {
         CameraError::Invalid { found, expected } => row.error(found, expected),
@@ -163,17 +161,17 @@ fn refused(row: &Row, error: CameraError) -> InputError {
     }
 }
 
-/// Columns that say what a matrix says already.
+/// Columns that a matrix makes redundant.
 #[rustfmt::skip]
 const OF_EYES: [&str; 17] = [
     "eye_x", "eye_y", "eye_z", "look_x", "look_y", "look_z", "forward_x", "forward_y", "forward_z",
     "up_x", "up_y", "up_z", "fovy_deg", "ortho_height", "aspect", "near", "far",
 ];
 
-/// The column of seconds as other programs write it.
+/// The column of seconds as other programs name it.
 const TIME: (&str, &str) = ("time", "time_s");
 
-/// Columns that other programs write, and those that say the same.
+/// Columns that other programs write, and their equivalents here.
 const SYNONYMS: [(&str, &str); 6] = [
     TIME,
     ("fovx_deg", "fovy_deg, the vertical one"),
@@ -287,9 +285,7 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
 
 /// Reads a points CSV with the columns `x,y,z`.
 ///
-/// # Errors
-/// The line of the first value that is no finite number; a file without
-/// points.
+/// # Errors The line of the first value that is not a finite number; a file without points.
 pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>> {
     let mut table = TableReader::open(bytes, file, &["x", "y", "z"])?;
     let columns = table.columns(&["x", "y", "z"])?;
@@ -332,7 +328,7 @@ mod tests {
         assert_eq!(path.cameras[0].frame.v(), DVec3::Z);
     }
 
-    /// A far plane behind the scene does not push the near one into it.
+    /// A far plane beyond the scene does not push the near plane into it.
     #[test]
     fn near_is_a_thousandth_of_the_nearer_of_far_and_scene() {
         let header = "eye_x,eye_y,eye_z,look_x,look_y,look_z,far\n";
@@ -348,7 +344,7 @@ mod tests {
         assert_eq!(defaults.depths(DVec3::ZERO), (1.0, Some(1e6)));
     }
 
-    /// Line by line: a height makes a lens orthographic, none leaves it perspective.
+    /// Line by line: with a height the lens is orthographic, without one perspective.
     #[test]
     fn a_height_is_an_orthographic_lens() {
         let header = "eye_x,eye_y,eye_z,look_x,look_y,look_z,fovy_deg,ortho_height,aspect,near,far";

@@ -1,4 +1,4 @@
-//! Views from eye height above the ground, outside of all items.
+//! Views from eye height above the ground, outside all items.
 //!
 //! The nearest items hide most of such a view.
 
@@ -12,27 +12,27 @@ use crate::input::Result;
 use crate::scene::{Regions, SeededRng, on_sphere};
 use crate::spec::Spec;
 
-/// Places drawn for each eye.
+/// Candidate positions drawn for each eye.
 ///
-/// The eye takes the one that rises least above the foot of what it stands on: in a city
-/// the street and not a roof, in a forest the ground and not the top of a tree.
+/// The eye takes the one that rises least above the foot of what it stands on: in a city the street
+/// instead of a roof, in a forest the ground instead of a treetop.
 const DRAWN: usize = 8;
-/// How often more places are drawn for an eye that is not on the ground.
+/// Most times that candidates are drawn again for an eye that is not on the ground.
 const MORE: usize = 4;
-/// Room that an eye has on all sides, world units.
+/// Clearance of an eye on all sides, world units.
 const CLEARANCE: f64 = 0.3;
-/// Spans of items that columns hold at once; more where items are more.
+/// Spans of items that columns hold at once; at least one per item.
 const MOST_SPANS: usize = 1 << 20;
 
-/// A place that was drawn, and what is above and below it.
+/// A candidate position, and the items above and below it.
 #[derive(Default)]
 struct Column {
     x: f64,
     y: f64,
-    /// Floor and ceiling of the room that it is in, or of the scene.
+    /// Floor and ceiling of its room, or of the scene.
     low: f64,
     high: f64,
-    /// The items that it passes through; none once the ground is known.
+    /// The items that it passes through; empty once the ground is known.
     spans: Vec<Span>,
     ground: f64,
     /// The lowest of the items.
@@ -44,7 +44,7 @@ struct Span {
     item: usize,
     bottom: f64,
     top: f64,
-    /// True if it is triangles that all face up.
+    /// True if its triangles all face up.
     is_ground: bool,
 }
 
@@ -60,7 +60,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
                 format_args!("height={height}; expected none, as the places of '{scene}' have one");
             return Err(unfit("street", reason));
         }
-        // Places of a map's author need no search.
+        // Places chosen by a map's author need no search.
         let poses = (0..stage.count).map(|_| {
             let eye = stage.scene.up.to_z_up(places[rng.below(places.len())].eye);
             Pose::new(eye, level(&mut rng))
@@ -70,7 +70,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let mut stands = lowest(stage, height, stage.count, &mut rng);
     let directions: Vec<DVec3> = (0..stage.count).map(|_| level(&mut rng)).collect();
     for _ in 0..MORE {
-        // All places of an eye may have been under trees.
+        // All candidates of an eye may have been under trees.
         let high = stands.iter_mut().filter(|stand| stand.is_on_top);
         let high: Vec<&mut Stand> = high.collect();
         let others = lowest(stage, height, high.len(), &mut rng);
@@ -89,17 +89,17 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
 #[derive(Clone, Copy)]
 struct Stand {
     eye: DVec3,
-    /// How far above the foot of the lowest item there, or of the floor.
+    /// Height above the foot of the lowest item there, or above the floor.
     rise: f64,
-    /// True if on what stands on that.
+    /// True if it stands above the lowest item, on another one.
     is_on_top: bool,
 }
 
-/// For each of `count` eyes the lowest of the places that are drawn for it.
+/// For each of `count` eyes the lowest of its candidates.
 fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
     let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
     fill(stage, &mut columns, height + CLEARANCE);
-    // If nearly all places have an item below them, the others are beyond its edge.
+    // If nearly all candidates have an item below them, the others are beyond the scene's edge.
     let bare = columns.iter().filter(|column| column.first.is_none());
     let has_ground = bare.count() * 10 < columns.len();
     let stands = columns.chunks(DRAWN).filter_map(|columns| {
@@ -120,12 +120,12 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
     stands.collect()
 }
 
-/// A direction in the plane of the ground, each equally likely.
+/// A horizontal direction, all equally likely.
 fn level(rng: &mut SeededRng) -> DVec3 {
     on_sphere(0.0, std::f64::consts::TAU * rng.unit())
 }
 
-/// The places that one eye may take: in one room, where there are rooms.
+/// The candidates of one eye: in one room, if there are rooms.
 fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
     let (min, max) = match &stage.scene.regions {
         Regions::Tiling(tiling) if !tiling.boxes.is_empty() => {
@@ -145,8 +145,8 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
 
 /// Finds the ground of all columns.
 ///
-/// If they pass through too many items, half of them at a time.
-/// O((n + columns) log columns) where boxes are small.
+/// If they pass through too many items, half of them at a time. O((n + columns) log columns) for
+/// small boxes.
 fn fill(stage: &Stage, columns: &mut [Column], room: f64) {
     if !pierce(stage, columns) {
         columns.iter_mut().for_each(|c| c.spans = Vec::new());
@@ -160,8 +160,9 @@ fn fill(stage: &Stage, columns: &mut [Column], room: f64) {
     }
 }
 
-/// Finds the items of all columns: by their boxes, or of a mesh by those of their
-/// triangles. False if several columns have too many.
+/// Finds the items of all columns: by their boxes, or those of a mesh's triangles.
+///
+/// False if several columns have too many.
 fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
     let most = match columns.len() {
         0..=1 => usize::MAX,
@@ -204,7 +205,7 @@ fn pierce(stage: &Stage, columns: &mut [Column]) -> bool {
 }
 
 impl Column {
-    /// A part of an item; those of one item follow each other.
+    /// Adds a part of an item; the parts of one item come in succession.
     fn add(&mut self, part: Span) {
         match self.spans.last_mut() {
             Some(span) if span.item == part.item => {
@@ -235,13 +236,14 @@ impl Column {
         });
     }
 
-    /// The lowest level with so much room above it: on the lowest item, or on what
-    /// stands on that, or on the floor where there is no item at all.
+    /// The lowest level with `room` above it.
+    ///
+    /// On the lowest item, on what stands on that, or on the floor if there is no item.
     fn level(&mut self, room: f64) -> f64 {
         self.merge();
         let mut ground = self.low;
         for (i, span) in self.spans.iter().enumerate() {
-            // Below the lowest item is under the ground.
+            // Room below the lowest item is underground.
             if i > 0 && span.bottom - ground >= room {
                 break;
             }
@@ -287,7 +289,7 @@ mod tests {
                 spans.push([bottom, bottom + rng.between(0.0, thickness)]);
             }
             let mut merged = column(spans.iter().copied());
-            // The lowest level, on the first or higher, with room below all that is higher.
+            // The lowest level, on the first item or higher, with room below everything higher.
             let first = (0..spans.len()).min_by(|&i, &j| spans[i][0].total_cmp(&spans[j][0]));
             let [foot, top] = spans.swap_remove(first.unwrap());
             let is_free = |level: &f64| {
@@ -322,7 +324,7 @@ mod tests {
         };
         let mut rng = stage.rng();
         let mut columns: Vec<Column> = (0..128).flat_map(|_| drawn(&stage, &mut rng)).collect();
-        // All at once they would hold half as much again.
+        // Together they would hold half as much again.
         assert!(!pierce(&stage, &mut columns));
         let held: usize = columns.iter().map(|column| column.spans.len()).sum();
         assert!((MOST_SPANS..=MOST_SPANS + 1024).contains(&held), "{held}");
@@ -363,7 +365,7 @@ mod tests {
     fn in_a_forest_eyes_stand_on_the_ground() {
         let scene = scene::load("forest:n=20000", &Default::default()).unwrap();
         let path = path::load("street:frames=64", &scene, &LensDefaults::default()).unwrap();
-        // Above the bottom of the ground tile that it is over.
+        // Above the bottom of the ground tile below.
         let rise = |eye: DVec3| {
             let boxes = scene.items.iter().map(|b| b.in_world(scene.origin));
             let below =
@@ -372,10 +374,10 @@ mod tests {
             eye.z - 1.7 - foot
         };
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
-        // Those of steep tiles.
+        // Those on steep tiles.
         let high = eyes.filter(|eye| rise(*eye) > 8.0).count();
         assert!(high <= 6, "{high} of 64 above the ground");
-        // Trees at the edge of the terrain reach beyond it; no eye is there.
+        // Trees at the edge of the terrain overhang it; no eye is there.
         let mut eyes = path.cameras.iter().map(|camera| camera.frame.eye);
         let is_over = |eye: DVec3| {
             let boxes = scene.items.iter().map(|b| b.in_world(scene.origin));
@@ -396,7 +398,7 @@ mod tests {
             let mut over = 0;
             for camera in &path.cameras {
                 let eye = camera.frame.eye;
-                // Heights, at the eye, of the planes of triangles over or under it.
+                // Heights, at the eye, of the planes of triangles above or below it.
                 let heights = triangles.iter().filter_map(|[a, b, c]| {
                     let side =
                         |p: &DVec3, q: &DVec3| (q - p).truncate().perp_dot((eye - p).truncate());
@@ -406,7 +408,7 @@ mod tests {
                     let normal = (b - a).cross(c - a);
                     is_within.then(|| eye.z + normal.dot(a - eye) / normal.z)
                 });
-                // Within reach of the edge there may be none.
+                // Near the edge there may be none.
                 let Some(below) = heights.filter(|z| *z <= eye.z).reduce(f64::max) else {
                     continue;
                 };

@@ -1,4 +1,4 @@
-//! Paths against scenes: specs, files, what cannot be a path.
+//! Paths in scenes: specs, files, and refused input.
 
 use super::*;
 use crate::camera::{LensKind, MatrixConvention, PlaneOptions};
@@ -108,7 +108,7 @@ fn a_visible_share_can_be_asked_for() {
     }
 }
 
-/// Every fourth item stands in the middle; the others are all around.
+/// Every fourth item is in the middle; the others are all around.
 #[test]
 fn a_visible_share_holds_where_the_order_of_items_repeats() {
     let mut rng = SeededRng::new(5);
@@ -126,7 +126,7 @@ fn a_visible_share_holds_where_the_order_of_items_repeats() {
     }
 }
 
-/// Two items far off make the scene large.
+/// Two distant items make the scene large.
 ///
 /// A near that grows with far loses the dense rest.
 #[test]
@@ -162,7 +162,7 @@ fn a_near_that_was_asked_for_stays_beside_a_visible_share() {
             assert_eq!(near, wanted.unwrap_or(far / 1000.0), "{source}");
         }
     }
-    // A farther far plane moves no near plane.
+    // A more distant far plane does not move the near plane.
     let near = |source| path(source, &scene).cameras[0].lens.near();
     assert_eq!(near("orbit:frames=2,far=1e6"), near("orbit:frames=2"));
     let error = load("orbit:visible=5%,far=10", &scene, &plain).unwrap_err();
@@ -178,7 +178,7 @@ fn a_count_is_met_in_scenes_of_any_size() {
         let visible = visible_share(&path, &scene) * f64::from(n);
         assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
     }
-    // Few views of few items leave little to a sample: all are counted.
+    // Few views of few items leave little to sample: all are counted.
     let scene = scene("uniform:n=100000");
     let path = path("street:frames=8,visible=50", &scene);
     let visible = visible_share(&path, &scene) * 1e5;
@@ -203,7 +203,7 @@ fn the_last_view_of_a_zoom_has_its_power() {
     }
 }
 
-/// Items that are visible together, and one that is visible at once.
+/// Items that are only visible together, and one that is visible at any scale.
 #[test]
 fn a_share_below_all_that_can_be_reached_is_refused() {
     let boxes = |n| vec![WorldBox::new(DVec3::ZERO, DVec3::ONE); n];
@@ -252,7 +252,7 @@ fn every_parameter_of_the_list_is_one_and_no_other() {
     for family in PATHS.iter().filter(|p| p.name != "animation") {
         let listed = listed(&format!("{PATH_PARAMS}, {}", family.params));
         for (key, default) in &listed {
-            // Defaults that are no number.
+            // Defaults that are not numbers.
             let value = match key.as_str() {
                 "near" => "0.5",
                 "far" => "1e6",
@@ -289,7 +289,7 @@ fn of_more_items_fewer_cameras_set_the_share() {
     assert_eq!(most, [128, 128, 128, 20, 16]);
 }
 
-/// One camera of a glTF file is no street.
+/// A single camera of a glTF file does not make a street.
 #[test]
 fn on_a_street_places_of_maps_alone_are_eyes() {
     let mut city = scene("city:n=300");
@@ -394,7 +394,7 @@ fn angles_in_radians_are_doubted() {
         let told = warnings(&scene, "c", &read.unwrap().cameras).join(", ");
         told.contains("c: a field of view under 2 degrees in all cameras")
     };
-    // A zoom may end as narrow.
+    // A zoom may end that narrow.
     assert_eq!([[1.1, 0.8], [60.0, 1.0]].map(told), [true, false]);
 }
 
@@ -425,7 +425,7 @@ fn reversed_depth_from_0_to_1_is_doubted_where_it_is_read_from_minus_1() {
     assert!(!told(conventions[0], oblique));
 }
 
-/// Two cameras along y with z up, and one that is rolled, turned down or far off.
+/// Two cameras along y with z up, and one that is rolled, turned down or far away.
 #[test]
 fn doubts_are_about_the_cameras_that_are_doubtful() {
     let scene = Scene::from_boxes("b", &[WorldBox::new(-DVec3::ONE, DVec3::ONE)]).unwrap();

@@ -1,7 +1,7 @@
 //! A walk through doors at constant eye height.
 //!
-//! Doors are the portals of rooms and the two-sided linedefs of a Doom map. Furniture and steps
-//! are no obstacles.
+//! Doors are the portals of rooms and the two-sided linedefs of a Doom map. Furniture and steps are
+//! no obstacles.
 
 use glam::{DVec2, DVec3};
 
@@ -15,22 +15,22 @@ const DRAWN: usize = 16;
 /// Least height of an opening that a Doom player fits through, map units.
 const FITTING: f64 = 56.0;
 
-/// A door in the plan of a floor.
+/// A door in a floor plan.
 struct Door {
     at: DVec2,
     sides: [u32; 2],
-    /// Its line among the walls, if it is one.
+    /// Index of its line among the walls, if it is one.
     wall: Option<usize>,
 }
 
-/// Floors joined by doors.
+/// Floors connected by doors.
 struct Plan<'s> {
     doors: Vec<Door>,
     /// Height of the floor of each region.
     floors: Vec<f64>,
     /// Doors of each region.
     exits: Vec<Vec<usize>>,
-    /// Lines that a step must not meet; none where regions are convex.
+    /// Lines that a step must not cross; none if regions are convex.
     walls: Vec<[DVec2; 2]>,
     map: Option<&'s WadMap>,
 }
@@ -51,7 +51,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     let way = plan.way(doors, height, &mut stage.rng());
     let mut lengths = vec![0.0];
     lengths.extend(way.windows(2).scan(0.0, |total, step| {
-        // A step up or down is none of the way.
+        // Steps up or down do not add to the length.
         *total += step[0].truncate().distance(step[1].truncate());
         Some(*total)
     }));
@@ -59,11 +59,11 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
         let next = lengths.partition_point(|&l| l <= length).min(way.len() - 1);
         let from = next.saturating_sub(1);
         let step = lengths[next] - lengths[from];
-        // No number where both are one point: either will do.
+        // NaN if both are the same point: either will do.
         let share = (length - lengths[from]) / step;
         way[from].lerp(way[next], share.min(1.0))
     };
-    // Towards the point that is a few steps ahead.
+    // Towards the point a few steps ahead.
     let total = lengths[way.len() - 1];
     let ahead = |eye: DVec3, length: f64| {
         let along = (at(length + 2.0 * height) - eye).with_z(0.0);
@@ -118,7 +118,7 @@ impl<'s> Plan<'s> {
             let [a, b] = sides.map(|side| map.sectors[side as usize].heights);
             let opening = a[1].min(b[1]) - a[0].max(b[0]);
             let [from, to] = walls[i];
-            // A line with an effect may open.
+            // A line with an action may open.
             let is_way = sides[0] != sides[1] && (opening >= FITTING || line.action != 0);
             is_way.then_some(Door {
                 at: (from + to) / 2.0,
@@ -146,7 +146,7 @@ impl<'s> Plan<'s> {
             way.push(eye(here));
             let exits = &self.exits[side as usize];
             let mut drawn = (0..DRAWN).map(|_| exits[rng.below(exits.len())]);
-            // Back through the same door if there is no way on.
+            // Back through the same door if no other is reachable.
             let free = drawn.find(|&next| self.is_free(side, here, next));
             here = free.unwrap_or(here);
             way.push(eye(here));
@@ -156,8 +156,7 @@ impl<'s> Plan<'s> {
         way
     }
 
-    /// Tests whether the way between two doors of a region meets no wall and does not
-    /// leave it.
+    /// Tests whether the segment between two doors stays in the region, off walls.
     fn is_free(&self, region: u32, from: usize, to: usize) -> bool {
         let [a, b] = [from, to].map(|door| &self.doors[door]);
         let (p, q) = (a.at, b.at);
@@ -165,13 +164,13 @@ impl<'s> Plan<'s> {
         let meets = |&[u, v]: &[DVec2; 2]| {
             side(p, q, u) * side(p, q, v) <= 0.0 && side(u, v, p) * side(u, v, q) <= 0.0
         };
-        // On one line all sides are 0: such walls count as met if they are between.
+        // On one line all sides are 0: such walls count as met if they lie between.
         let is_near =
             |&[u, v]: &[DVec2; 2]| u.min(v).cmple(p.max(q)).all() && p.min(q).cmple(u.max(v)).all();
         let own = [a.wall, b.wall];
         let mut walls = self.walls.iter().enumerate();
-        // Where no line is met, all of the way is where its middle is: between two edges
-        // of a platform it leads over that.
+        // If no line is met, the whole segment is where its midpoint is: between two edges of a
+        // platform it crosses that.
         let is_within = self.map.is_none_or(|map| {
             let leaf = map.tree.descend((p + q) / 2.0);
             leaf.is_some_and(|leaf| map.leaf_sectors[leaf as usize] == region)
@@ -246,7 +245,7 @@ mod tests {
                 map.leaf_sectors[leaf as usize]
             };
             let mut sectors: Vec<u32> = eyes.iter().map(|&eye| sector(eye)).collect();
-            // Planes of the tree are rounded: beside a line its sector is uncertain.
+            // Planes of the tree are rounded: close to a line its sector is uncertain.
             let is_below = |eye: &&DVec3| {
                 let off = map.lines.iter().all(|line| {
                     let [u, v] = line.ends.map(|end| glam::DVec2::from(end.map(f64::from)));

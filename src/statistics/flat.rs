@@ -1,7 +1,7 @@
 //! Estimates as three fields of a row, for `#[serde(flatten, serialize_with)]`.
 //!
-//! The value, and `_lower` and `_upper` behind its name for the ends of the 95 % interval;
-//! null where there is none.
+//! The value, and the ends of the 95 % interval under its name with `_lower` and `_upper`; null
+//! without an interval.
 
 use serde::Serializer;
 use serde::ser::SerializeStruct;

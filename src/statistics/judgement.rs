@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::trimmed::{kept, moderate};
 use super::{Trimmed, student, trimmed_mean};
 
-/// Which hypotheses are rejected so that the chance of even one false rejection
-/// among all of them is at most `alpha` (Holm 1979, "A simple sequentially
-/// rejective multiple test procedure", sec. 2). A NaN is never rejected, but
-/// counts as a test.
+/// Rejected hypotheses, with a familywise error rate of at most `alpha` (Holm).
+///
+/// Holm 1979, "A simple sequentially rejective multiple test procedure", sec. 2. A NaN is never
+/// rejected, but counts as a test.
 fn holm(p: &[f64], alpha: f64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
@@ -21,35 +21,39 @@ fn holm(p: &[f64], alpha: f64) -> Vec<bool> {
     rejected
 }
 
-/// Error rate of each direction over all cells of a comparison. Half of what is
-/// promised (5 %): it leaves room for what the model does not know.
+/// Familywise error rate of each direction over all cells of a comparison.
+///
+/// Half of the promised 5 %, as a reserve for what the model does not cover.
 const ALPHA: f64 = 0.025;
 
-/// Changes of up to 1 % are not called one: two builds of the same code differ
-/// as much by where the linker puts it (Mytkowicz et al. 2009), and two processes
-/// by where their memory lies. What is proven is that a change is larger.
+/// Least change that counts as one: 1 %; a verdict proves a larger one.
+///
+/// Two builds of the same code differ that much by where the linker puts it (Mytkowicz et al.
+/// 2009), and two processes by where their memory lies.
 const FLOOR: f64 = 0.01;
 
-/// Quantile of the 95 % interval's ends.
+/// Quantile for the ends of the 95 % interval.
 const INTERVAL: f64 = 0.975;
 
-/// Quantile of the 90 % interval's ends: each is a one-sided test of 5 %.
+/// Quantile for the ends of the 90 % interval: a one-sided 5 % test at each end.
 const EQUIVALENCE: f64 = 0.95;
 
-/// 95 % quantile of the normal distribution: the power that a resolution has.
+/// 95 % quantile of the normal distribution: the power of a resolution.
 const POWER: f64 = 1.645;
 
-/// With more than this many pairs, "how many more?" is answered: none would do.
+/// Most pairs for which the number of missing pairs is computed.
+///
+/// If this many would not decide, none would.
 const MOST_PAIRS: usize = 10_000;
 
 named! {
-    /// How the new times stand to the old.
+    /// Change of the new times against the old ones.
     #[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Change {
-        /// Longer: proven, and by more than the floor.
+        /// Longer: proven to exceed the floor.
         Slower = "slower",
-        /// Shorter: proven, and by more than the floor.
+        /// Shorter: proven to exceed the floor.
         Faster = "faster",
         /// A change of the threshold's size is ruled out.
         Same = "same",
@@ -59,29 +63,29 @@ named! {
     }
 }
 
-/// The verdict on one cell, with the figures it rests on.
+/// The verdict on one cell, with its figures.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Judgement {
     /// Slower, faster, same or inconclusive.
     pub change: Change,
     /// New time / old time: above 1 is slower.
     pub ratio: f64,
-    /// Lower end of the 95 % interval of the ratio.
+    /// Lower end of the 95 % interval of the ratio; `None` below three pairs.
     ///
-    /// The interval always holds the ratio; `None` below three pairs.
+    /// The interval always contains the ratio.
     pub lower: Option<f64>,
     /// Upper end of the interval.
     pub upper: Option<f64>,
-    /// The smallest change (0.05 is 5 %) that about 85 % of such comparisons find.
+    /// The smallest change (0.05 is 5 %) that about 85 % of such comparisons detect.
     pub resolution: Option<f64>,
-    /// For an inconclusive cell: about how many more pairs would decide it.
+    /// For an inconclusive cell: approximate number of further pairs that would decide.
     pub more_pairs: Option<usize>,
-    /// Pairs of processes; of two reports: processes of the smaller.
+    /// Pairs of processes; for two reports, processes of the smaller one.
     pub pairs: usize,
 }
 
 impl Judgement {
-    /// A quotient that decides nothing.
+    /// A ratio without a verdict.
     pub(crate) fn without_interval(ratio: f64, pairs: usize) -> Judgement {
         Judgement {
             ratio,
@@ -93,24 +97,22 @@ impl Judgement {
 
 /// Judges the cells of a comparison of two binaries.
 ///
-/// Per cell: ln(new / old) of each pair of processes; `threshold` 0.05 is 5 %. `None` for a
-/// cell with under three pairs, or with a value that is not finite.
+/// Per cell: ln(new / old) of each pair of processes; `threshold` 0.05 is 5 %. `None` for a cell
+/// with fewer than three pairs, or with a value that is not finite.
 ///
-/// The estimate of a cell is the 20 % trimmed mean of its differences, its
-/// standard error is moderated over the cells. In this order a cell is
+/// The estimate of a cell is the 20 % trimmed mean of its differences; its standard error is
+/// moderated over the cells. In this order a cell is
 ///
-/// 1. slower or faster, if its change is over 1 %, significant in one-sided tests
-///    of 2.5 % with Holm's correction over the judged cells (each direction by
-///    itself);
-/// 2. same, if the 90 % interval lies within ± ln(1 + threshold): two one-sided
-///    tests (Schuirmann 1987);
+/// 1. slower or faster, if its change exceeds 1 %, significant in one-sided tests of 2.5 % with
+///    Holm's correction over the judged cells (each direction by itself);
+/// 2. same, if the 90 % interval lies within ± ln(1 + threshold): two one-sided tests (Schuirmann
+///    1987);
 /// 3. inconclusive.
 ///
-/// The order matters for a change that is proven, but within the threshold (+3 %
-/// with a threshold of 5 %): it is slower. The threshold says how finely "same"
-/// is to be shown, so it rules how many pairs are run; it is no licence for a
-/// proven loss, which a series of 2 % steps would turn into any loss at all. Who
-/// wants to tolerate it compares `lower` with a tolerance.
+/// A change that is proven but within the threshold (+3 % with a threshold of 5 %) is therefore
+/// slower. The threshold is the precision required for "same", and so determines the number of
+/// pairs; it does not excuse a proven loss, since a series of 2 % steps would add up to any loss.
+/// To tolerate some loss, compare `lower` with a tolerance.
 pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>> {
     let estimates = differences.iter().map(|d| trimmed_mean(d));
     judge_estimates(estimates.collect(), [threshold, FLOOR], |cells| {
@@ -118,19 +120,19 @@ pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>>
     })
 }
 
-/// Returns true if every judged cell is known finely enough.
+/// Returns true if the resolution of every judged cell is at most the threshold.
 ///
-/// The rule by which a comparison stops. On precision, never on significance: stopping at
-/// the first significant difference would find one where there is none.
+/// The stopping rule of a comparison: precision, never significance. Stopping at the first
+/// significant difference would find one where there is none.
 pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {
     let mut resolutions = judged.iter().map(|j| j.as_ref().and_then(|j| j.resolution));
     resolutions.all(|found| found.is_some_and(|resolution| resolution <= threshold))
 }
 
-/// Judges estimates of ln(new / old), once their variances are moderated and then
-/// widened; a cell without an estimate stays without verdict. What is slower or
-/// faster is proven to have changed by more than the floor. `widen` returns the
-/// standard error of each cell that more pairs leave.
+/// Judges estimates of ln(new / old) after moderating and widening their variances.
+///
+/// A cell without an estimate gets no verdict. Slower or faster means a change proven to exceed the
+/// floor. `widen` returns the part of each cell's standard error that more pairs do not reduce.
 pub(super) fn judge_estimates(
     estimates: Vec<Option<Trimmed>>,
     [threshold, floor]: [f64; 2],
@@ -168,12 +170,12 @@ pub(super) fn judge_estimates(
     estimates.iter().map(judged).collect()
 }
 
-/// Two one-sided tests of 5 % each.
+/// Two one-sided 5 % tests.
 fn is_same(cell: &Trimmed, threshold: f64) -> bool {
     cell.mean.abs() + cell.margin(EQUIVALENCE) <= threshold.ln_1p()
 }
 
-/// The change that is found with 82 to 88 % power at Holm's strictest step.
+/// The change that is detected with 82 to 88 % power at Holm's strictest step.
 ///
 /// With 95 % at twice its level: exp(ln 1.01 + (t(1 - 0.05/m, df) + 1.645) se) - 1.
 fn resolution(cell: &Trimmed, tests: usize, floor: f64) -> f64 {
@@ -181,9 +183,10 @@ fn resolution(cell: &Trimmed, tests: usize, floor: f64) -> f64 {
     (floor + (t + POWER) * cell.standard_error).exp_m1()
 }
 
-/// How many more pairs would prove the change that was found, or would prove it
-/// small enough: whichever comes first, if mean and spread stay as they are. Of the
-/// standard error `fixed` stays as well.
+/// Number of further pairs that would prove the change, or prove it small enough.
+///
+/// Whichever comes first, if mean and spread stay as they are; `fixed` is the part of the standard
+/// error that pairs do not reduce.
 fn more_pairs(
     cell: &Trimmed,
     fixed: f64,
@@ -200,8 +203,8 @@ fn more_pairs(
         let margin = future.margin(1.0 - ALPHA / tests as f64);
         margin + floor < future.mean.abs() || is_same(&future, threshold)
     };
-    // More pairs never make it worse but for a step of the cut: halving is
-    // exact enough for an "about".
+    // More pairs never make it worse, except for a step of the cut: bisection is exact enough for
+    // an approximate number.
     let (mut without, mut with) = (cell.count, MOST_PAIRS);
     if !decides(with) {
         return None;
@@ -269,11 +272,11 @@ mod tests {
         let change = |centre, spread| one(cell(centre, spread), 0.05).change;
         assert_eq!(change(0.06, 0.005), Change::Slower);
         assert_eq!(change(-0.06, 0.005), Change::Faster);
-        // Proven to be over 1 %, within the threshold: still slower.
+        // Proven to exceed 1 %, within the threshold: still slower.
         assert_eq!(change(0.03, 0.005), Change::Slower);
-        // Proven, but perhaps by under 1 %.
+        // Proven, but possibly below 1 %.
         assert_eq!(change(0.02, 0.005), Change::Same);
-        // Proven, but under 1 %.
+        // Proven, but below 1 %.
         assert_eq!(change(0.009, 0.001), Change::Same);
         assert_eq!(change(0.0, 0.01), Change::Same);
         assert_eq!(change(0.03, 0.02), Change::Inconclusive);
@@ -309,7 +312,7 @@ mod tests {
                 ..trimmed_mean(&cell(centre, spread)).unwrap()
             };
             let more = more_pairs(&before, 0.0, 1, [0.05, FLOOR.ln_1p()]).unwrap();
-            // The same pairs again and again: mean and spread stay.
+            // The same pairs repeated: mean and spread stay.
             let repeated = |count: usize| {
                 let values: Vec<f64> = cell(centre, spread).repeat(1 + count / 10);
                 one(values, 0.05).change
@@ -317,7 +320,7 @@ mod tests {
             assert_ne!(repeated(more * 6 / 5 + 10), Change::Inconclusive, "{more}");
             assert_eq!(repeated(more * 2 / 3), Change::Inconclusive, "{more}");
         }
-        // Too small to be called a change, too large to be called the same.
+        // Too small for a change, too large for "same".
         assert_eq!(one(cell(0.008, 0.02), 0.005).more_pairs, None);
         assert_eq!(one(cell(0.06, 0.005), 0.05).more_pairs, None);
     }

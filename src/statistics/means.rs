@@ -11,10 +11,9 @@ pub(super) fn squares(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-/// exp of the mean logarithm.
+/// exp of the mean logarithm, the right mean for ratios.
 ///
-/// `None` for no data or a value that is not positive. The right mean for ratios (Fleming
-/// and Wallace 1986).
+/// Fleming and Wallace 1986. `None` for no data or a value that is not positive.
 pub fn geometric_mean(values: &[f64]) -> Option<f64> {
     if values.is_empty() || values.iter().any(|v| v.is_nan() || *v <= 0.0) {
         return None;
@@ -25,10 +24,9 @@ pub fn geometric_mean(values: &[f64]) -> Option<f64> {
 
 /// The mean of the middle half of the values; `None` for no data or a NaN.
 ///
-/// A value that a quartile falls into counts by the share of it that lies
-/// inside, so that the mean is continuous in the number of values (Tukey's
-/// midmean: Rosenberger and Gasko 1983, in Hoaglin, Mosteller and Tukey,
-/// "Understanding Robust and Exploratory Data Analysis", ch. 10, sec. C).
+/// A value cut by a quartile is weighted with its share inside, so that the mean is continuous in
+/// the number of values (Tukey's midmean: Rosenberger and Gasko 1983, in Hoaglin, Mosteller and
+/// Tukey, "Understanding Robust and Exploratory Data Analysis", ch. 10, sec. C).
 pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     if values.is_empty() || values.iter().any(|value| value.is_nan()) {
         return None;
@@ -36,18 +34,17 @@ pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     let sorted = sorted(values.to_vec());
     let count = sorted.len() as f64;
     let (low, high) = (count / 4.0, count * 3.0 / 4.0);
-    // Value i takes the room from i to i + 1.
+    // Value i occupies the range from i to i + 1.
     let (first, end) = (low.floor() as usize, high.ceil() as usize);
     let share = |i: usize| high.min((i + 1) as f64) - low.max(i as f64);
     let sum: f64 = (first..end).map(|i| sorted[i] * share(i)).sum();
-    // Rounding can carry the mean of equal values past them.
+    // Rounding may move the mean of equal values beyond them.
     Some((sum / (count / 2.0)).clamp(sorted[first], sorted[end - 1]))
 }
 
-/// Quantile `q` in `[0, 1]`.
+/// Quantile `q` in `[0, 1]`; `None` for no data.
 ///
-/// Linear interpolation between order statistics (Hyndman and Fan 1996, type 7: what R
-/// and NumPy do). `None` for no data.
+/// Linear interpolation between order statistics (Hyndman and Fan 1996, type 7, as in R and NumPy).
 pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let at = q.clamp(0.0, 1.0) * last as f64;
@@ -67,7 +64,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
     quantile(&sorted(values.to_vec()), 0.5)
 }
 
-/// Fewer values show clusters by chance.
+/// Least number of values: fewer show clusters by chance.
 const FEWEST: usize = 40;
 
 /// Each cluster's least share of the values.
@@ -76,16 +73,15 @@ const LEAST_SHARE: f64 = 0.2;
 /// Least distance of the centres, in standard deviations within the clusters.
 const SEPARATION: f64 = 5.0;
 
-/// The centres of the two clusters of times of one and the same work.
+/// The centres of the two clusters of times of the same work, the fast one first.
 ///
-/// Geometric means, the fast one first; `None` if there is but one cluster, below forty
-/// values, or for a value that is not positive.
+/// Geometric means; `None` for a single cluster, fewer than forty values, or a value that is not
+/// positive.
 ///
-/// The logarithms are split where the variance within both parts is smallest
-/// (Otsu 1979, "A threshold selection method from gray-level histograms"), each
-/// part at least a fifth of them. The parts are two clusters if their centres
-/// are over 5 standard deviations apart, these taken within the parts: halves
-/// of a normal distribution are 2.6 apart, of a uniform one 3.5.
+/// The logarithms are split where the variance within both parts is smallest (Otsu 1979, "A
+/// threshold selection method from gray-level histograms"), each part at least a fifth of them. The
+/// parts are two clusters if their centres are more than 5 within-part standard deviations apart:
+/// halves of a normal distribution are 2.6 apart, of a uniform one 3.5.
 pub fn two_speeds(times: &[f64]) -> Option<(f64, f64)> {
     let usable = |time: &f64| *time > 0.0 && time.is_finite();
     if times.len() < FEWEST || !times.iter().all(usable) {
@@ -112,7 +108,7 @@ mod tests {
 
     #[test]
     fn an_interquartile_mean_weighs_the_values_at_its_ends() {
-        // Of five values the middle three, the outer two of them by 3/4.
+        // Of five values the middle three, the outer two of these weighted by 3/4.
         let found = interquartile_mean(&[9.0, 1.0, 2.0, 3.0, 5.0]).unwrap();
         assert!((found - (0.75 * 2.0 + 3.0 + 0.75 * 5.0) / 2.5).abs() < 1e-12);
     }
@@ -172,7 +168,7 @@ mod tests {
             .collect();
         let (fast, slow) = two_speeds(&rounds).unwrap();
         assert!((fast - 1.15).abs() < 0.01 && (slow - 1.87).abs() < 0.02);
-        // Too rare to be a speed; not two heaps but one; too few; no times.
+        // Too rare to be a speed; one heap; too few; no times.
         let rare: Vec<f64> = spread(10, 1.75, 2.0)
             .chain(spread(90, 1.13, 1.17))
             .collect();

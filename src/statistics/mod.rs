@@ -1,7 +1,6 @@
 //! The statistics of a report: quantiles, intervals, tests, verdicts, ranks.
 //!
-//! Pure functions of numbers; each names its source. Nothing else in the crate computes an
-//! interval.
+//! Pure functions of numbers; each names its source. All intervals of the crate are computed here.
 
 pub mod flat;
 mod judgement;

@@ -6,12 +6,12 @@ use super::means::squares;
 use super::trimmed::centre;
 use super::{Trimmed, trimmed_mean};
 
-/// Level of the intervals shown.
+/// Level of the reported intervals.
 const LEVEL: f64 = 0.95;
 
 /// A value with its 95 % interval, if there is one.
 ///
-/// There is none below three processes, or two clusters of a rate.
+/// None below three processes, or for a rate below two clusters.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Estimate {
     /// The value itself.
@@ -43,7 +43,7 @@ impl Estimate {
         Some([self.lower?, self.upper?])
     }
 
-    /// Tests whether it is shown to be above a bound: by its lower end, if it has one.
+    /// Tests whether it is above a bound: its lower end, or its value without one.
     pub fn exceeds(self, bound: f64) -> bool {
         self.lower.unwrap_or(self.value) > bound
     }
@@ -53,12 +53,12 @@ impl Estimate {
         self.map(|x| x / units)
     }
 
-    /// Value and interval times a number of units, such as a million.
+    /// Value and interval multiplied by a number of units, such as a million.
     pub fn times(self, units: f64) -> Estimate {
         self.map(|x| x * units)
     }
 
-    /// The same for a share, which is no more than 1.
+    /// Value and interval of a share, clamped to 1.
     pub fn of_share(self) -> Estimate {
         self.map(|share| share.min(1.0))
     }
@@ -72,17 +72,15 @@ impl Estimate {
     }
 }
 
-/// Time of a structure, in the unit that the logarithms were taken of.
+/// Time of a structure, in the unit whose logarithms were taken.
 ///
-/// From ln(time) per process of the `reference` and of the structure's `own` in the same
-/// processes. `None` if there are no processes, not the same number, or a value that is
-/// not finite.
+/// From ln(time) per process of the `reference` and of the structure's `own` in the same processes.
+/// `None` without processes, for different numbers of them, or for a value that is not finite.
 ///
-/// The difference r of a process is own - reference: what slows both leaves it
-/// alone. Shown are exp(X + mean r) and the [`speedup`] exp(-mean r), with X the
-/// reference's trimmed mean, so the ratio of two shown values is the ratio that
-/// is shown. The value's interval is as wide as that of the structure's own
-/// trimmed mean, about X + mean r: it holds the value by construction.
+/// The difference r of a process is own - reference, so a slowdown of both cancels. Reported are
+/// exp(X + mean r) and the [`speedup`] exp(-mean r), with X the reference's trimmed mean: the ratio
+/// of two reported values is the reported ratio. The interval has the width of that of the
+/// structure's own trimmed mean, centred on X + mean r: it contains the value by construction.
 pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     let middle = centre(reference)? + centre(&differences(own, reference)?)?;
     let margin = margin(own);
@@ -92,8 +90,8 @@ pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Estimate> {
 
 /// Time of the reference / time of the structure: above 1 is faster.
 ///
-/// The ratio of the two values of [`one_run`]. No interval for the reference itself, whose speed-up is 1
-/// by definition. `None` as there.
+/// The ratio of the two values of [`one_run`]. No interval for the reference itself, whose speed-up
+/// is 1 by definition. `None` as for [`one_run`].
 pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     let differences = differences(own, reference)?;
     let mean = centre(&differences)?;
@@ -107,7 +105,7 @@ pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
 
 /// Time of `own` / time of `other`.
 ///
-/// The ratio of the two values of [`one_run`] beside the same `reference`; `None` as there.
+/// The ratio of the two values of [`one_run`] with the same `reference`; `None` as for [`one_run`].
 pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> {
     let value = one_run(reference, own)?.value / one_run(reference, other)?.value;
     let margin = margin(&differences(own, other)?);
@@ -115,15 +113,15 @@ pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> 
     Some(Estimate::within(value, ends))
 }
 
-/// `own` - `other` per process; `None` if those are not the same number.
+/// `own` - `other` per process; `None` if their numbers differ.
 fn differences(own: &[f64], other: &[f64]) -> Option<Vec<f64>> {
     let pairs = own.iter().zip(other);
     (own.len() == other.len()).then(|| pairs.map(|(own, other)| own - other).collect())
 }
 
-/// The trimmed mean of `own` less that of `other` in the same processes.
+/// The trimmed mean of `own` minus that of `other` in the same processes.
 ///
-/// Its error is that of the intervals shown: none that holds a ratio of 1 is of two ranks.
+/// Uses the error of the reported intervals: if one contains a ratio of 1, the two share a rank.
 /// `None` below three processes and for a NaN.
 pub(super) fn paired_difference(own: &[f64], other: &[f64]) -> Option<Trimmed> {
     let mut found = estimate(&differences(own, other)?)?;
@@ -136,17 +134,15 @@ fn margin(values: &[f64]) -> f64 {
     estimate(values).map_or(f64::NAN, |found| found.margin(0.5 + LEVEL / 2.0))
 }
 
-/// The trimmed mean with a standard error no smaller than the plain mean's, and
-/// one degree of freedom fewer.
+/// The trimmed mean, with a larger standard error and one degree of freedom fewer.
 ///
-/// On a machine with two speeds the values of ten processes form two heaps. If
-/// at most two lie in the smaller one, Winsorising draws them into the other, and
-/// the standard error collapses: Yuen's 95 % intervals held the truth in 89 % (5
-/// processes) and 92 % (10) of 4000 simulated runs. With the plain mean's as its
-/// least it was 93 % (10), for it still varies more than that of a normal sample
-/// does; with a degree of freedom fewer 95.6 % (10) and 94 % (12 to 20), but wide
-/// below eight: 99 % (5). Differences of pairs in turns have one heap, and keep
-/// Yuen's: 94 to 95 %.
+/// The standard error is at least the plain mean's. On a machine with two speeds the values of ten
+/// processes form two heaps. If at most two lie in the smaller one, Winsorising draws them into the
+/// other and the standard error collapses: Yuen's 95 % intervals contained the truth in 89 % (5
+/// processes) and 92 % (10) of 4000 simulated runs. With the plain mean's as the least it was 93 %
+/// (10), as it varies more than for a normal sample; with one degree of freedom fewer 95.6 % (10)
+/// and 94 % (12 to 20), but wide below eight: 99 % (5). Differences of alternating pairs have one
+/// heap and keep Yuen's: 94 to 95 %.
 pub(super) fn estimate(values: &[f64]) -> Option<Trimmed> {
     let mut found = trimmed_mean(values)?;
     let count = values.len() as f64;
@@ -182,10 +178,10 @@ mod tests {
 
     #[test]
     fn two_heaps_do_not_narrow_the_interval() {
-        // Two of ten processes on a slow machine. Winsorised: no spread at all.
+        // Two of ten processes on a slow machine; Winsorised, no spread at all.
         let own = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.5];
         let shown = one_run(&[0.0; 10], &own).unwrap();
-        // Plain: sqrt(0.4 / 90), by t(4) = 2.776445.
+        // Plain: sqrt(0.4 / 90), times t(4) = 2.776445.
         let margin = 2.776_445_105 * (0.4f64 / 90.0).sqrt();
         assert!(
             (shown.upper.unwrap().ln() - margin).abs() < 1e-8,

@@ -3,25 +3,25 @@
 use super::one_run::paired_difference;
 use super::trimmed::centre;
 
-/// Level at which two are told apart.
+/// Level at which two structures differ significantly.
 pub const ALPHA: f64 = 0.05;
 
 /// Ranks structures by their trimmed means, 1 for the smallest.
 ///
-/// Two that share rank 1 are followed by rank 3. Per structure: one value per process, all
-/// from the same processes, paired by index.
+/// Two structures that share rank 1 are followed by rank 3. Per structure: one value per process,
+/// all from the same processes, paired by index.
 ///
-/// A structure shares the first rank from whose fastest a paired test over the processes,
-/// that of the intervals shown, does not tell it apart (two-sided, `alpha`). Under three
-/// processes nothing can be tested, and each has a rank of its own by order.
-/// Equal means are ordered by index, a structure with no values or with one
-/// that is not finite comes last: the ranks are the same for the same input.
+/// A structure shares the first rank whose fastest member does not differ from it significantly, in
+/// a paired test over the processes with the error of the reported intervals (two-sided, `alpha`).
+/// Below three processes nothing can be tested, and ranks follow the order. Equal means are ordered
+/// by index; a structure without values, or with one that is not finite, comes last. Ranks are
+/// deterministic.
 pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
     let mean = |values: &Vec<f64>| centre(values).unwrap_or(f64::INFINITY);
     let means: Vec<f64> = values.iter().map(mean).collect();
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
-    // The fastest of each rank first, with those that share it.
+    // The fastest of each rank first, followed by those that share the rank.
     let mut shared: Vec<Vec<usize>> = Vec::new();
     for i in order {
         let is_tied = |group: &&mut Vec<usize>| !told_apart(&values[group[0]], &values[i], alpha);
@@ -40,7 +40,7 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
 
 /// Returns true if a paired test over the processes finds `a` less than `b`.
 ///
-/// Two-sided at `alpha`; under three processes, if its trimmed mean is less.
+/// Two-sided at `alpha`; below three processes, if its trimmed mean is less.
 pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     let means = centre(a).zip(centre(b));
     means.is_some_and(|(a, b)| a < b) && told_apart(a, b, alpha)
@@ -51,29 +51,28 @@ fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
     difference.is_none_or(|found| found.p_above(0.0) <= alpha / 2.0)
 }
 
-/// How a point stands to the front.
+/// Relation of a point to the front.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Standing {
     /// A point of the front that dominates this one; `None` on the front.
     ///
-    /// No worse in anything and better in something, as the samples show.
+    /// No worse in any dimension and better in one, as the samples show.
     pub dominated_by: Option<usize>,
-    /// Dominated by the values, which the samples do not show: it shares the front.
+    /// Dominated by value, but not shown by the samples: shares the front.
     pub is_tie: bool,
 }
 
 /// Dominance among points by their values; less is better.
 ///
-/// Every point has as many values. The front is what nothing is shown to dominate: which of
-/// two equals came out ahead is luck.
+/// All points have the same number of values. The front is what nothing is shown to dominate, since
+/// the order of two equals is chance.
 ///
-/// `is_less(a, b, k)` says whether the samples show `a` to be better than `b` in
-/// dimension `k`; it is called only where the values say so. That a point is
-/// dominated is shown if a point that is no worse than it (itself, or one that is
-/// as good or better by all values) is shown to be worse in some dimension than a
-/// point that is no worse than that one. So dominance is transitive, as it is by
-/// the values alone, and a point that is only known less well is protected by it
-/// neither from the front's points nor from those that they dominate. O(n^2).
+/// `is_less(a, b, k)` tests whether the samples show `a` to be better than `b` in dimension `k`; it
+/// is called only if the values say so. Let A be dominated, by its values, by a point of the front.
+/// A is shown to be dominated if some point B, no worse than A by all values (A itself included),
+/// is dominated by a third one and shown to be worse than it in some dimension. So dominance is
+/// transitive, as it is by the values alone, and a point with noisy samples protects itself neither
+/// from the front's points nor from those that they dominate. O(n^2).
 pub fn dominance<V: AsRef<[f64]>>(
     values: &[V],
     is_less: &dyn Fn(usize, usize, usize) -> bool,
@@ -87,7 +86,7 @@ pub fn dominance<V: AsRef<[f64]>>(
         |a: usize, b: usize| better(a, b) && less(a, b).any(|(k, less)| less && is_less(a, b, k));
     let on_front = |&a: &usize| !all.clone().any(|b| better(b, a));
     let front: Vec<usize> = all.clone().filter(on_front).collect();
-    // Those of the front first: they dominate most.
+    // Points of the front first: they dominate most.
     let is_beaten = |b: usize| {
         let rivals = front.iter().copied().chain(all.clone());
         rivals.into_iter().any(|a| shown(a, b))
@@ -126,7 +125,7 @@ mod tests {
             let less = |own: &[f64]| own.iter().zip(&base).map(|(own, base)| own - base).collect();
             let shown = ratio(&base, &a, &b).unwrap();
             let relative: [Vec<f64>; 2] = [less(&a), less(&b)];
-            // The ratio shown is that of the trimmed means beside the base.
+            // The reported ratio is that of the trimmed means relative to the base.
             let order = [centre(&relative[0]), centre(&relative[1])];
             prop_assume!(order[0] < order[1]);
             let is_apart = ranks(&relative, ALPHA) == [1, 2];
@@ -164,7 +163,7 @@ mod tests {
         let level = |shift: f64| vec![shift, shift + 0.1, shift - 0.1, shift];
         assert!(is_less(&level(1.0), &level(2.0), 0.05));
         assert!(!is_less(&level(2.0), &level(1.0), 0.05));
-        // The same on the mean, and in every process another order.
+        // Equal on average, in a different order in each process.
         let swinging = [1.4, 0.7, 0.8, 1.2];
         assert!(!is_less(&level(1.0), &swinging, 0.05) && !is_less(&swinging, &level(1.0), 0.05));
         assert!(is_less(&[1.0], &[1.1], 0.05) && !is_less(&[1.0], &[1.0], 0.05));
@@ -181,7 +180,7 @@ mod tests {
             for a in &placed {
                 let before = placed.iter().filter(|b| *b < a).count();
                 prop_assert_eq!(*a, before + 1);
-                // The fastest of a rank comes before all of later ranks.
+                // The fastest of a rank precedes all of later ranks.
                 let own = (0..rows.len()).filter(|k| placed[*k] == *a);
                 let fastest = own.map(|k| means[k]).fold(f64::INFINITY, f64::min);
                 let mut later = (0..rows.len()).filter(|k| placed[*k] > *a);
@@ -192,7 +191,7 @@ mod tests {
 
     #[test]
     fn what_is_not_told_apart_shares_the_front() {
-        // Error and time; the third is slower but too noisy to be told apart.
+        // Error and time; the third is slower but too noisy to differ significantly.
         let values = [[5.0, 10.0], [5.0, 12.0], [5.0, 11.0], [0.0, 30.0]];
         let told = |a: usize, b: usize, _: usize| a != 2 && b != 2;
         let found = dominance(&values, &told);
@@ -209,7 +208,7 @@ mod tests {
         // Worse than one that is shown to be worse.
         let values = [[5.0, 10.0], [5.0, 12.0], [5.0, 13.0]];
         assert_eq!(dominance(&values, &told), [front, beaten, beaten]);
-        // Equal points stand beside each other.
+        // Equal points share the front.
         assert_eq!(dominance(&[[1.0], [1.0]], &|_, _, _| true), [front; 2]);
     }
 
@@ -229,7 +228,7 @@ mod tests {
                 if let Some(by) = own.dominated_by {
                     prop_assert!(found[by] == Standing::default() && better(by));
                 }
-                // What is no better than something beaten is beaten.
+                // A point no better than a beaten one is beaten.
                 let beaten = |k: usize| found[k].dominated_by.is_some();
                 let below_beaten = (0..values.len()).any(|k| better(k) && beaten(k));
                 prop_assert!(beaten(i) || !below_beaten);

@@ -1,14 +1,13 @@
 //! Rates of rare events (false positives per visible item) with sampling errors.
 //!
-//! A camera is one observation: its items share the same planes, so their errors are
-//! correlated.
+//! A camera is one observation: its items share the same planes, so their errors are correlated.
 
 use super::means::{mean, squares};
 use super::{Estimate, student};
 
-/// Level of the intervals shown.
+/// Level of the reported intervals.
 const LEVEL: f64 = 0.95;
-/// Nothing seen in n: below 3/n at 95 %, because 0.95 = 1 - exp(-3).
+/// No event in n units: below 3/n at 95 %, because 0.95 = 1 - exp(-3).
 const NOTHING_SEEN: f64 = 3.0;
 
 /// The rate of clusters by their numbers of events and units.
@@ -17,17 +16,14 @@ pub fn rate_of<T>(clusters: &[T], of: impl Fn(&T) -> [u64; 2]) -> Option<Estimat
     rate(&counts.collect::<Vec<_>>())
 }
 
-/// The rate of clusters, each with its events and its units.
-///
-/// `None` without units.
+/// The rate of clusters, each with its events and its units; `None` without units.
 ///
 /// The ratio of the sums, with the standard error of a ratio of cluster totals,
-/// `n/(n-1) sum (y - R x)^2 / (sum x)^2`, and Student's t of n - 1 degrees of
-/// freedom (Cochran 1977, "Sampling Techniques", 3rd ed., secs. 2.11 and 9A.1).
-/// If nothing was seen in `x` units the upper end is 3/x (Hanley and
-/// Lippman-Hand 1983, "If nothing goes wrong, is everything all right?", JAMA
-/// 249, p. 1743), and it is never nearer than that: units count as independent
-/// there, since nothing says otherwise.
+/// `n/(n-1) sum (y - R x)^2 / (sum x)^2`, and Student's t with n - 1 degrees of freedom (Cochran
+/// 1977, "Sampling Techniques", 3rd ed., secs. 2.11 and 9A.1). Without events in `x` units the
+/// upper end is 3/x (Hanley and Lippman-Hand 1983, "If nothing goes wrong, is everything all
+/// right?", JAMA 249, p. 1743), and it is never closer than 3/x to the value: units count as
+/// independent there, for lack of contrary evidence.
 fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
     let sum = |k: usize| clusters.iter().map(|c| c[k]).sum::<f64>();
     let (events, units) = (sum(0), sum(1));
@@ -48,13 +44,13 @@ fn rate(clusters: &[[f64; 2]]) -> Option<Estimate> {
     })
 }
 
-/// Returns true if the clusters show the mean of `a` to be below that of `b`.
+/// Returns true if the mean of `a` is significantly below that of `b`.
 ///
-/// Paired by index: Student's paired t, two-sided at `alpha`. From one cluster, or where
-/// all differences are the same, the order of the means decides.
+/// Paired by index: Student's paired t, two-sided at `alpha`. For one cluster, or if all
+/// differences are equal, the order of the means decides.
 ///
-/// The plain mean and no trimmed one: what is rare lies in few clusters, and
-/// those a trimmed mean leaves out.
+/// The plain mean instead of a trimmed one: rare events lie in few clusters, which trimming would
+/// discard.
 pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
     let differences: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
     let (mean, count) = (mean(&differences), differences.len() as f64);
@@ -81,7 +77,7 @@ mod tests {
 
     #[test]
     fn the_standard_error_is_that_of_a_ratio_of_totals() {
-        // Residuals 0, 1 and -1: sqrt(3/2 * 2) / 60, by t(2) = 4.302653.
+        // Residuals 0, 1 and -1: sqrt(3/2 * 2) / 60, times t(2) = 4.302653.
         let found = rate(&[[1.0, 10.0], [3.0, 20.0], [2.0, 30.0]]).unwrap();
         assert!((found.value - 0.1).abs() < 1e-15);
         let margin = 4.302_652_73 * 0.028_867_513;
@@ -97,14 +93,14 @@ mod tests {
         assert_eq!(rate(&[]), None);
         let share = rate(&[[0.0, 4.0], [3.0, 4.0]]).unwrap().of_share();
         assert_eq!(share.upper, Some(1.0));
-        // Nothing seen, and clusters that are all alike: never nearer than 3/n.
+        // No events, and clusters that are all alike: never closer than 3/n.
         for events in [0.0, 1.0] {
             let alike = rate(&[[events, 10.0]; 30]).unwrap();
             assert_eq!(alike.upper, Some(alike.value + 3.0 / 300.0), "{events}");
         }
     }
 
-    /// Cameras with rates of their own, as frusta of other directions have them.
+    /// Cameras with different rates, as for frusta in different directions.
     fn sample(seed: u64, cameras: usize) -> Vec<[f64; 2]> {
         let mut random = Pcg64::seed_from_u64(seed);
         let one = |_| {
@@ -131,7 +127,7 @@ mod tests {
         let b = [5.0, 7.0, 6.0, 9.0, 5.0, 8.0];
         let a = b.map(|x| x - 1.0 - 0.1 * (x - 6.0));
         assert!(shows_less(&a, &b, 0.05) && !shows_less(&b, &a, 0.05));
-        // One cluster of six tells nothing.
+        // One cluster of six is not significant.
         let mut one = [0.0; 6];
         one[3] = 9.0;
         assert!(!shows_less(&[0.0; 6], &one, 0.05));

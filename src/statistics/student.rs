@@ -7,11 +7,11 @@ use super::{Estimate, student};
 /// P(T > t).
 pub(super) fn upper_tail(t: f64, df: f64) -> f64 {
     let student = StudentsT::new(0.0, 1.0, df).ok().filter(|_| !t.is_nan());
-    // By symmetry: 1 - cdf would lose what is small.
+    // By symmetry: 1 - cdf would cancel small tails.
     student.map_or(f64::NAN, |student| student.cdf(-t))
 }
 
-/// The t that the share `p` of the distribution lies below.
+/// The t below which the share `p` of the distribution lies.
 pub(super) fn quantile(p: f64, df: f64) -> f64 {
     let student = StudentsT::new(0.0, 1.0, df).ok();
     let student = student.filter(|_| (0.0..=1.0).contains(&p));
@@ -20,8 +20,8 @@ pub(super) fn quantile(p: f64, df: f64) -> f64 {
 
 /// Slope of the least-squares line through the points `(x, y)`.
 ///
-/// With its 95 % interval by Student's t (Draper and Smith 1998, "Applied Regression
-/// Analysis", sec. 1.4). `None` for fewer than three points, or all at one x.
+/// With its 95 % interval by Student's t (Draper and Smith 1998, "Applied Regression Analysis",
+/// sec. 1.4). `None` for fewer than three points, or if all have the same x.
 pub fn slope(points: &[(f64, f64)]) -> Option<Estimate> {
     let freedom = points.len().checked_sub(2).filter(|f| *f > 0)?;
     let count = points.len() as f64;
@@ -92,7 +92,7 @@ mod tests {
             (found.value - found.lower.unwrap() - 0.3897).abs() < 1e-3,
             "{found:?}"
         );
-        // Twenty degrees of freedom: t(20) = 2.085963, no longer that of ten.
+        // Twenty degrees of freedom: t(20) = 2.085963, not that of ten.
         let many: Vec<(f64, f64)> = (0..22).map(|i| (f64::from(i), f64::from(i % 2))).collect();
         let found = slope(&many).unwrap();
         let spread = (0..22).map(|i| (f64::from(i) - 10.5).powi(2)).sum::<f64>();

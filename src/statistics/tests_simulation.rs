@@ -1,10 +1,10 @@
-//! The estimators before a mock clock.
+//! The estimators with a simulated clock.
 //!
-//! How often do intervals hold the truth, how often is a verdict false, how often is a change
-//! found? The clock has the variances that were measured on a shared machine of two virtual
-//! cores, as standard deviations of logarithms: processes 16-18 %, rounds of a process 17-20 %
-//! with two speeds (1.15 against 1.75 to 2.0, autocorrelation 0.25), memory layout up to 1.1 %,
-//! the difference of a pair of processes 3 %.
+//! How often do intervals contain the truth, how often is a verdict false, how often is a change
+//! detected? The clock has the variances measured on a shared machine of two virtual cores, as
+//! standard deviations of logarithms: processes 16-18 %, rounds of a process 17-20 % with two
+//! speeds (1.15 against 1.75 to 2.0, autocorrelation 0.25), memory layout up to 1.1 %, the
+//! difference of a pair of processes 3 %.
 
 use rand::RngExt;
 use rand::SeedableRng;
@@ -14,7 +14,7 @@ use super::*;
 
 const ROUNDS: usize = 77;
 const PROCESSES: usize = 10;
-/// Pairs of a comparison: at first, and at most.
+/// Pairs of a comparison: initially, and at most.
 const PAIRS: [usize; 2] = [10, 32];
 const CELLS: usize = 14;
 
@@ -40,13 +40,14 @@ impl Clock {
         deviation * radius * self.uniform(0.0, std::f64::consts::TAU).cos()
     }
 
-    /// How much of a process's time the other hardware thread is busy.
+    /// Share of a process's time in which the other hardware thread is busy.
     fn busy(&mut self) -> f64 {
         self.uniform(0.1, 0.9)
     }
 
-    /// ln(time) of the rounds of a tree's process: two speeds, of which one
-    /// lasts from round to round with autocorrelation 0.25.
+    /// ln(time) of the rounds of a tree's process.
+    ///
+    /// Two speeds; a speed persists from round to round with autocorrelation 0.25.
     fn tree_rounds(&mut self, busy: f64) -> Vec<f64> {
         let layout = self.normal(0.008);
         let mut slow = self.uniform(0.0, 1.0) < busy;
@@ -60,12 +61,12 @@ impl Clock {
         (0..ROUNDS).map(|_| round()).collect()
     }
 
-    /// x of one process of `linear`, which hardly notices the other thread.
+    /// ln(time) of a process of `linear`, hardly affected by the other thread.
     fn linear(&mut self, busy: f64) -> f64 {
         7.0 + 0.02 * busy + self.normal(0.01)
     }
 
-    /// x of `linear` and of a tree in the same processes.
+    /// ln(time) of `linear` and of a tree in the same processes.
     fn run(&mut self, processes: usize) -> (Vec<f64>, Vec<f64>) {
         let process = |_| {
             let busy = self.busy();
@@ -75,14 +76,15 @@ impl Clock {
         (0..processes).map(process).unzip()
     }
 
-    /// ln(new / old) of a pair of processes in turns on one core: what lasts
-    /// longer than a turn is the same for both. One pair of ten meets a load.
+    /// ln(new / old) of a pair of processes that alternate on one core.
+    ///
+    /// Disturbances longer than a turn affect both alike. One pair in ten meets a load.
     fn pair(&mut self, change: f64) -> f64 {
         let loaded = self.uniform(0.0, 1.0) < 0.1;
         change + self.normal(if loaded { 0.05 } else { 0.028 })
     }
 
-    /// A comparison that takes pairs until it resolves 5 %.
+    /// A comparison that adds pairs until it resolves 5 %.
     fn comparison(&mut self, changes: &[f64]) -> Vec<Option<Judgement>> {
         let mut cells = vec![Vec::new(); changes.len()];
         loop {

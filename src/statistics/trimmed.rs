@@ -1,4 +1,4 @@
-//! The 20 % trimmed mean with its standard error, and what two samples share.
+//! The 20 % trimmed mean with its standard error, and variances shared by cells.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,27 +8,27 @@ use super::{median, sorted, student};
 /// Share of the values that is cut off at each end.
 const TRIM: f64 = 0.2;
 
-/// The degrees of freedom that the other cells' variances are worth to a cell.
+/// Degrees of freedom that the other cells' variances are worth to a cell.
+///
 /// Smyth estimates them; measured over cells of one comparison: about 8.
 const PRIOR_DF: f64 = 8.0;
 
 /// A 20 % trimmed mean with the standard error that Student's t needs.
 ///
-/// The standard error is Yuen's: the values beyond the cut are drawn in to the
-/// outermost that are kept (Winsorised), and their sum of squares is divided by
-/// h(h - 1), with h values kept and h - 1 degrees of freedom (Yuen 1974, "The
-/// two-sample trimmed t for unequal population variances", sec. 2; Wilcox 2017,
-/// "Introduction to Robust Estimation and Hypothesis Testing", sec. 4.3). With
-/// nothing to trim (under five values) this is the plain mean and its t.
+/// The standard error is Yuen's: values beyond the cut are replaced by the outermost kept ones
+/// (Winsorised), and their sum of squares is divided by h(h - 1), with h values kept and h - 1
+/// degrees of freedom (Yuen 1974, "The two-sample trimmed t for unequal population variances", sec.
+/// 2; Wilcox 2017, "Introduction to Robust Estimation and Hypothesis Testing", sec. 4.3). With
+/// nothing to trim (fewer than five values) this is the plain mean and its t.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Trimmed {
-    /// Mean of the values that are kept.
+    /// Mean of the kept values.
     pub mean: f64,
     /// Standard error of `mean`.
     pub standard_error: f64,
     /// Degrees of freedom of the standard error.
     pub df: f64,
-    /// Values it is made of, those beyond the cut included.
+    /// Number of values, those beyond the cut included.
     pub count: usize,
 }
 
@@ -42,7 +42,7 @@ impl Trimmed {
     /// One-sided p of the hypothesis "the mean is at most `x`".
     pub fn p_above(&self, x: f64) -> f64 {
         match self.mean - x {
-            // No spread at all: 0 / 0 must not become a NaN.
+            // Without any spread 0 / 0 must not become a NaN.
             0.0 => 0.5,
             distance => student::upper_tail(distance / self.standard_error, self.df),
         }
@@ -55,7 +55,7 @@ impl Trimmed {
         mirrored.p_above(-x)
     }
 
-    /// t(`p`) standard errors.
+    /// Student's quantile of `p` times the standard error.
     pub(super) fn margin(&self, p: f64) -> f64 {
         student::quantile(p, self.df) * self.standard_error
     }
@@ -80,22 +80,23 @@ pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
     })
 }
 
-/// The trimmed mean alone, of any number of values.
+/// The trimmed mean alone, for any number of values.
 ///
-/// `None` for none, a NaN or an infinity.
+/// `None` for no values, a NaN or an infinity.
 pub fn centre(values: &[f64]) -> Option<f64> {
     if values.is_empty() || !values.iter().all(|value| value.is_finite()) {
         return None;
     }
     let (cut, sorted) = (cut(values.len()), sorted(values.to_vec()));
     let inner = &sorted[cut..sorted.len() - cut];
-    // Rounding can carry the mean of equal values past them.
+    // Rounding may move the mean of equal values beyond them.
     Some(mean(inner).clamp(inner[0], inner[inner.len() - 1]))
 }
 
-/// The difference of two independent trimmed means, `new` - `old`, with the
-/// standard error and the degrees of freedom of Welch's test (Yuen 1974, sec.
-/// 2; Wilcox 2017, sec. 5.3).
+/// The difference of two independent trimmed means, `new` - `old`.
+///
+/// With the standard error and the degrees of freedom of Welch's test (Yuen 1974, sec. 2; Wilcox
+/// 2017, sec. 5.3).
 pub(super) fn difference(old: &Trimmed, new: &Trimmed) -> Trimmed {
     let (a, b) = (old.standard_error.powi(2), new.standard_error.powi(2));
     let welch = (a + b).powi(2) / (a * a / old.df + b * b / new.df);
@@ -108,15 +109,14 @@ pub(super) fn difference(old: &Trimmed, new: &Trimmed) -> Trimmed {
     }
 }
 
-/// Lends each cell of one comparison what the others tell about the variance:
-/// se² becomes (8 median(se²) + df se²) / (8 + df), and df grows by 8.
+/// Shrinks the variances of one comparison's cells towards their median.
 ///
-/// From ten processes a standard error is a rough guess; the cells of one
-/// comparison share machine and method, so their median is the better guess, and
-/// eight degrees of freedom is what it is worth (Smyth 2004, "Linear models and
-/// empirical Bayes methods ...", sec. 4, with a fixed prior). It is never worth
-/// more than what the other cells have together: a single cell stays as it is,
-/// for its own variance is no news about itself.
+/// se² becomes (8 median(se²) + df se²) / (8 + df), and df grows by 8. From ten processes a
+/// standard error is a rough estimate. The cells of one comparison share machine and method, so
+/// their median is the better one, and it is worth eight degrees of freedom (Smyth 2004, "Linear
+/// models and empirical Bayes methods ...", sec. 4, with a fixed prior). It is never worth more
+/// than the other cells have together: a single cell is unchanged, since its own variance adds no
+/// information about itself.
 pub(super) fn moderate(cells: &mut [Trimmed]) {
     let variances: Vec<f64> = cells.iter().map(|c| c.standard_error.powi(2)).collect();
     let Some(typical) = median(&variances) else {
@@ -132,18 +132,17 @@ pub(super) fn moderate(cells: &mut [Trimmed]) {
     }
 }
 
-/// Values cut off at each end of `count`.
+/// Number of values cut off at each end of `count`.
 fn cut(count: usize) -> usize {
     (TRIM * count as f64).floor() as usize
 }
 
-/// Values of `count` that are kept: Yuen's h.
+/// Number of values kept of `count`: Yuen's h.
 pub(super) fn kept(count: usize) -> f64 {
     (count - 2 * cut(count)) as f64
 }
 
-/// The values in their order, those beyond the cut drawn in to the outermost
-/// that are kept.
+/// The sorted values, those beyond the cut replaced by the outermost kept ones.
 fn winsorised(values: &[f64]) -> Vec<f64> {
     let (cut, sorted) = (cut(values.len()), sorted(values.to_vec()));
     let (low, high) = (sorted[cut], sorted[sorted.len() - 1 - cut]);
@@ -223,7 +222,7 @@ mod tests {
         near(cells[1].standard_error.powi(2), (8.0 * 4.0 + 45.0) / 13.0);
         near(cells[2].standard_error, 2.0);
         assert_eq!(cells.map(|cell| cell.df), [13.0; 3]);
-        // Two cells: each learns no more than the other knows. One: nothing.
+        // Two cells: neither gains more than the other has. One cell: nothing.
         let mut cells = [cell(1.0, 5.0), cell(3.0, 5.0)];
         moderate(&mut cells);
         near(cells[0].standard_error.powi(2), (5.0 * 5.0 + 5.0) / 10.0);

@@ -7,37 +7,38 @@ use super::one_run::estimate;
 use super::trimmed::{centre, difference};
 use super::{Judgement, Trimmed, median};
 
-/// Changes of up to 5 % between two runs are not called one: single cells of
-/// one program moved by 9 % from one quiet run to the next.
+/// Least change between two runs that counts as one: 5 %.
+///
+/// Single cells of one program moved by 9 % from one quiet run to the next.
 const FLOOR_OF_RUNS: f64 = 0.05;
 
-/// Fewer cells do not tell how far two runs scatter: of all cells, and of those of
-/// one structure or group.
+/// Fewest cells from which the scatter of runs is estimated.
+///
+/// Among all cells; among those of one structure or group.
 const LEAST_CELLS: usize = 8;
 const LEAST_OF_ONE: usize = 4;
-/// Standard deviation / median absolute deviation, of a normal distribution.
+/// Standard deviation / median absolute deviation of a normal distribution.
 const SD_PER_MAD: f64 = 1.4826;
 
 /// Judges the cells of two stored reports.
 ///
-/// Per cell: one logarithm per process, of a time or better of a ratio within the process;
-/// the numbers of processes may differ.
+/// Per cell: one logarithm per process, of a time or better of a ratio within the process; the
+/// numbers of processes may differ.
 ///
-/// The estimate is the difference of two 20 % trimmed means with the standard
-/// error and degrees of freedom of Yuen and Welch, or those of the plain means where they
-/// scatter more. Two runs of one program differ by more than their processes do: other
-/// load, other hours. How much more, the cells themselves tell: their scatter beyond their
-/// standard errors, over all of them, over those of one structure about their own middle,
-/// or over those of one group (scene and path), whichever is most, is added to their
-/// variances (an empirical null: Efron 2004, "Large-scale simultaneous
-/// hypothesis testing"). Then the rules of [`judge`](super::judge), but that slower
-/// and faster mean a change that is proven to be over 5 %, and that no cell's variance is
-/// lowered for what the others have: a tree that fills the cache scatters ten times as
-/// much as a small one. A cell with under three processes on a side is
-/// inconclusive, with a ratio but without interval, and is no test that Holm's
-/// correction counts. `None` for a cell with an empty side, or a value that is
-/// not finite. Cells that only one of the two reports has are left out.
-/// `names` has structure and group of each cell.
+/// The estimate is the difference of two 20 % trimmed means with the standard error and degrees of
+/// freedom of Yuen and Welch, or those of the plain means if these scatter more. Two runs of one
+/// program differ by more than their processes do: other load, other hours. The additional variance
+/// is estimated from the cells themselves, as an empirical null (Efron 2004, "Large-scale
+/// simultaneous hypothesis testing"): it is the scatter beyond their standard errors of all cells,
+/// of those of one structure about their own median, or of those of one group (scene and path),
+/// whichever is largest.
+///
+/// Then the rules of [`judge`](super::judge) apply with two exceptions: slower and faster mean a
+/// change proven to exceed 5 %, and no cell's variance is lowered to that of the others, since a
+/// tree that fills the cache scatters ten times as much as a small one. A cell with fewer than
+/// three processes on a side is inconclusive, with a ratio but no interval, and does not count as a
+/// test in Holm's correction. `None` for a cell with an empty side, or a value that is not finite.
+/// Cells of only one of the two reports are left out. `names` has structure and group of each cell.
 pub fn judge_unpaired<S: Ord, G: Ord>(
     old: &[Vec<f64>],
     new: &[Vec<f64>],
@@ -51,7 +52,7 @@ pub fn judge_unpaired<S: Ord, G: Ord>(
     let known = estimates.iter().zip(names);
     let known = known.filter_map(|(found, names)| Some(((*found)?, names)));
     let (own, names): (Vec<Trimmed>, Vec<&(S, G)>) = known.unzip();
-    // More processes leave the scatter of the runs as it is.
+    // More processes do not reduce the scatter of the runs.
     let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
         for (cell, own) in cells.iter_mut().zip(own) {
             if own.standard_error > cell.standard_error {
@@ -65,7 +66,7 @@ pub fn judge_unpaired<S: Ord, G: Ord>(
     judged.collect()
 }
 
-/// Adds the scatter of the runs; the standard deviation that each cell got.
+/// Adds the scatter of the runs; returns each cell's added standard deviation.
 fn add_scatter_of_runs<S: Ord, G: Ord>(cells: &mut [Trimmed], names: &[&(S, G)]) -> Vec<f64> {
     // Relative to the others of its group a cell is expected not to move.
     let of_all = excess_variance(cells, 0.0, LEAST_CELLS);
@@ -98,8 +99,9 @@ fn scatter_within<'n, N: Ord>(
     alike.map(|(name, cells)| (name, scatter(cells))).collect()
 }
 
-/// Variance of the means about `middle` beyond their standard errors, by the median
-/// absolute deviation; none of fewer than `least` cells.
+/// Variance of the means about `middle` beyond their standard errors.
+///
+/// From the median absolute deviation; zero for fewer than `least` cells.
 fn excess_variance(cells: &[Trimmed], middle: f64, least: usize) -> f64 {
     if cells.len() < least {
         return 0.0;
@@ -139,7 +141,7 @@ mod tests {
         assert_eq!(found.change, Change::Faster);
     }
 
-    /// Ten structures in four scenes each, all of which moved by what `of` says.
+    /// Ten structures in four scenes each; `of` is the change of each cell.
     fn judged(of: impl Fn(usize, usize) -> f64) -> Vec<Judgement> {
         let names: Vec<(usize, usize)> = (0..40).map(|cell| (cell / 4, cell % 4)).collect();
         let old = vec![side(0.0); 40];
@@ -156,24 +158,24 @@ mod tests {
             slower.count()
         };
         assert_eq!(slower(&calm), 4, "a structure that moved as a whole");
-        // The same where every cell moves by as much, up or down.
+        // The same if every cell moves that much, up or down.
         let wild = judged(|structure, scene| match (structure + scene) % 2 {
             0 => 0.12,
             _ => -0.12,
         });
         assert_eq!(slower(&wild), 0);
-        // As many processes as one likes leave it as it is.
+        // No number of processes changes that.
         assert!(wild.iter().all(|found| found.more_pairs.is_none()));
         let unclear = judge_unpaired(&[side(0.0)], &[side(0.06)], &[("a", 0)], 0.05)[0].unwrap();
         assert!(unclear.more_pairs.is_some());
-        // One structure alone that scatters is found by its own cells.
+        // A single structure that scatters is found by its own cells.
         let one = judged(|structure, scene| match (structure, scene) {
             (3, 0 | 2) => 0.12,
             (3, _) => -0.12,
             _ => 0.0,
         });
         assert_eq!(slower(&one), 0);
-        // Nor do the cells of a scene that others on the machine have disturbed.
+        // Nor do the cells of a scene that was disturbed by other processes.
         let disturbed = judged(|structure, scene| match (scene, structure % 2) {
             (1, 0) => 0.3,
             (1, _) => -0.3,
@@ -182,7 +184,7 @@ mod tests {
         assert_eq!(slower(&disturbed), 0);
     }
 
-    /// Quiet cells say nothing of the one beside them.
+    /// Quiet cells say nothing about a noisy neighbour.
     #[test]
     fn a_noisy_cell_keeps_its_variance() {
         let noisy = |centre: f64| -> Vec<f64> {

@@ -47,9 +47,9 @@ const MOST_LEVELS: usize = 8;
 
 /// An implicit tree of sixteen-fold blocks over items in tree order.
 ///
-/// Level 0 holds the items, sixteen per block. Lane `l` of block `b` on level `k` bounds block `16
-/// b + l` of level `k - 1`, and with it the items from `(16 b + l) 16^k` on. Per item: 25.6 bytes
-/// of blocks, 4 of id, 0.13 of lanes.
+/// Level 0 holds the items, sixteen per block. Lane `l` of block `b` on level `k` bounds block
+/// `16 b + l` of level `k - 1`, and with it the items from `(16 b + l) 16^k` on. Per item: 25.6
+/// bytes of blocks, 4 of id, 0.13 of lanes.
 #[derive(Default)]
 pub struct Wide {
     blocks: Vec<BoxBlock>,
