@@ -16,15 +16,13 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 
 /// Reads a scene from boxes CSV.
 ///
-/// Numbers are f64 and are rounded outward to f32 about an origin chosen in f64. `file`
-/// only names the source in errors.
+/// Numbers are f64 and are rounded outward to f32 relative to an origin chosen in f64. `file` only
+/// names the source in errors.
 ///
-/// With `skip_bad_items`, rows that are not a finite box with min <= max are
-/// left out and counted in [`Scene::skipped_items`]; the others keep the ids of
-/// their rows ([`Scene::row_of`]).
+/// With `skip_bad_items`, rows that are not a finite box with min <= max are left out and counted
+/// in [`Scene::skipped_items`]; the others keep the ids of their rows ([`Scene::row_of`]).
 ///
-/// # Errors
-/// A missing or wrong header; the first bad row with the number of all.
+/// # Errors A missing or wrong header; the first bad row, with the number of bad rows.
 pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let mut rows = read_rows(&mut table, f64::from(f32::MAX))?;
@@ -47,10 +45,9 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
     Ok(scene)
 }
 
-/// Boxes to search by, of the same form: any numbers of f64.
+/// Reads boxes to search by, in the same format: any f64 numbers.
 ///
-/// # Errors
-/// A missing or wrong header, or the first bad row.
+/// # Errors A missing or wrong header, or the first bad row.
 pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let mut rows = read_rows(&mut table, f64::MAX)?;
@@ -72,7 +69,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// Tells of labels that may have been meant as bounds.
+    /// Warns of labels that may have been meant as bounds.
     fn note_near_names(&self, file: &str) {
         for name in self.labels.iter().map(|label| &label.column) {
             if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
@@ -92,13 +89,13 @@ impl Rows {
     }
 }
 
-/// A name in lower case without marks and blanks.
+/// A name in lower case without punctuation and blanks.
 fn letters(name: &str) -> String {
     name.to_lowercase()
         .replace(|c: char| !c.is_alphanumeric(), "")
 }
 
-/// Reads all rows; bad is also a bound beyond `limit`.
+/// Reads all rows; a bound beyond `limit` is bad too.
 fn read_rows(table: &mut TableReader, limit: f64) -> Result<Rows> {
     let centres = ["centerx", "centrex", "centroidx"];
     let is_centre = |name: &String| centres.contains(&&letters(name)[..]);
@@ -154,8 +151,8 @@ fn read_rows(table: &mut TableReader, limit: f64) -> Result<Rows> {
 
 /// Writes a scene's boxes as they were written, in world coordinates.
 ///
-/// Its labels are further columns. Reading the numbers back gives the same f64;
-/// [`Scene::settled`] makes a scene what is then read.
+/// Its labels are further columns. Reading the numbers back gives the same f64; [`Scene::settled`]
+/// converts a scene to the one that is then read.
 pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(output);
     for bound in BOUNDS {

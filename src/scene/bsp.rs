@@ -1,6 +1,6 @@
 //! The 2-D BSP tree of a Doom map.
 //!
-//! The bounds of its leaves, and which leaf holds a point, exactly.
+//! The bounds of its leaves, and the leaf that contains a point, exactly.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -22,12 +22,12 @@ pub struct BspNode {
     pub children: [BspChild; 2],
 }
 
-/// End of a branch of a map's tree, or its next node.
+/// Child of a node: another node, or the end of the branch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum BspChild {
     /// Index of a node.
     Node(u32),
-    /// Index of a leaf; in a Quake III map it counts the open leaves alone.
+    /// Index of a leaf; in a Quake III map only open leaves are counted.
     Leaf(ItemId),
     /// A leaf within the solid.
     Solid,
@@ -35,7 +35,7 @@ pub enum BspChild {
 
 /// The leaf that a descent ends in.
 ///
-/// `below` has the child of a node on the side of the point.
+/// `below` returns the child of a node on the side of the point.
 pub fn descend(mut at: BspChild, below: impl Fn(u32) -> BspChild) -> Option<ItemId> {
     loop {
         match at {
@@ -46,14 +46,14 @@ pub fn descend(mut at: BspChild, below: impl Fn(u32) -> BspChild) -> Option<Item
     }
 }
 
-/// Most planes of a map one below another that structures divide by.
+/// Most planes of a map on one path that structures divide by.
 ///
 /// Real maps have 13 to 61. A chain of planes would make building quadratic.
 const DEPTH: usize = 256;
 
 /// The planes of a map's nodes, for structures that can use them.
 ///
-/// A tree as the readers of maps have checked, down to [`DEPTH`].
+/// The nodes must form a tree, as the readers of maps check; cut off below [`DEPTH`].
 pub fn plane_tree(
     root: BspChild,
     nodes: impl Iterator<Item = (Plane, [BspChild; 2])>,
@@ -82,7 +82,7 @@ pub fn plane_tree(
 /// The sign of `normal . p - distance`, exactly.
 pub fn side_of(normal: DVec3, distance: f64, p: DVec3) -> i32 {
     let value = normal.dot(p) - distance;
-    // Twice the rounding of three products and three sums.
+    // Twice the rounding error of three products and three sums.
     let doubt = (normal.abs().dot(p.abs()) + distance.abs()) * 8.0 * f64::EPSILON;
     if value.abs() > doubt {
         return if value < 0.0 { -1 } else { 1 };
@@ -95,9 +95,9 @@ pub fn side_of(normal: DVec3, distance: f64, p: DVec3) -> i32 {
 impl BspNode {
     /// 0 for the front (right) side, 1 for the back.
     ///
-    /// Ties follow the Doom engine's `R_PointOnSide` (linuxdoom 1.10, r_main.c), which
-    /// treats a point on an axis-parallel line unlike one on any other line. Exact; the
-    /// engine's 16.16 truncation is not imitated.
+    /// Ties follow the Doom engine's `R_PointOnSide` (linuxdoom 1.10, r_main.c), which treats
+    /// points on axis-parallel lines differently from those on other lines. Exact; the engine's
+    /// 16.16 truncation is not imitated.
     pub fn side(&self, p: DVec2) -> usize {
         let (DVec2 { x, y }, DVec2 { x: dx, y: dy }) = (self.start, self.direction);
         if dx == 0.0 {
@@ -109,13 +109,13 @@ impl BspNode {
             return usize::from(along > 0.0);
         }
         let to = p - self.start;
-        // The engine's short cut by sign bits; it differs from the products
-        // below only for a point exactly at the line's start.
+        // The engine's short cut by sign bits; differs from the products below only for a point
+        // exactly at the line's start.
         let parts = [dy, dx, to.x, to.y].into_iter();
         if parts.filter(|v| *v < 0.0).count() % 2 == 1 {
             return usize::from((dy < 0.0) != (to.x < 0.0));
         }
-        // Coordinates of a map are 16-bit integers, so that this distance is exact.
+        // Coordinates of a map are 16-bit integers, so this distance is exact.
         let normal = DVec3::new(-dy, dx, 0.0);
         usize::from(side_of(normal, dx * y - dy * x, p.extend(0.0)) >= 0)
     }
@@ -135,10 +135,10 @@ pub struct BspTree {
 impl BspTree {
     /// Bounds the leaves of a tree within the closed square `[low, high]^2`.
     ///
-    /// No point outside of it has a leaf. O(nodes * depth).
+    /// Points outside it have no leaf. O(nodes * depth).
     ///
-    /// # Errors
-    /// A node or leaf that is reached twice or does not exist: the nodes form no tree.
+    /// # Errors A node or leaf that is reached twice or does not exist: the nodes do not form a
+    /// tree.
     pub fn new(
         nodes: Vec<BspNode>,
         root: BspChild,
@@ -146,7 +146,7 @@ impl BspTree {
         [low, high]: [f64; 2],
     ) -> Result<BspTree, String> {
         let mut reached = [vec![false; nodes.len()], vec![false; leaf_count]];
-        // A leaf that no node has is nowhere.
+        // A leaf without a node has no place.
         let mut boxes = vec![planar_bounds(&[]); leaf_count];
         let corners = [(low, low), (high, low), (high, high), (low, high)];
         let square = corners.map(DVec2::from).to_vec();
@@ -179,7 +179,7 @@ impl BspTree {
 
     /// The partition lines as upright planes, for structures that can use them.
     ///
-    /// Ties do not matter to those: they keep their own bounds.
+    /// Structures keep their own bounds, so ties do not matter to them.
     pub fn plane_tree(&self) -> PlaneTree {
         let nodes = self.nodes.iter().map(|node| {
             // Right of the direction is the front.
@@ -190,7 +190,7 @@ impl BspTree {
         plane_tree(self.root, nodes)
     }
 
-    /// The leaf that holds the point, by descent from the root.
+    /// The leaf that contains the point, by descent from the root.
     ///
     /// `None` outside the closed square. O(depth).
     pub fn descend(&self, p: DVec2) -> Option<ItemId> {
@@ -204,15 +204,15 @@ impl BspTree {
     }
 }
 
-/// Margin by which a cell is grown on every side before its box is taken, in map
-/// units: far above the rounding of the clipping below (under 2^-20 for
-/// coordinates of 2^16), far below anything a map shows.
+/// Margin by which a cell is grown on every side before its box is taken.
+///
+/// In map units. Far above the rounding of the clipping below (under 2^-20 for coordinates of
+/// 2^16), far below any detail of a map.
 const CELL_MARGIN: f64 = 1.0 / 1024.0;
 
 /// The part of a convex polygon on one side of a node's line.
 ///
-/// The line is moved outward by [`CELL_MARGIN`], so that rounding and ties can only make
-/// the cell larger.
+/// The line is moved outward by [`CELL_MARGIN`], so rounding and ties can only enlarge the cell.
 fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
     let length = node.direction.length();
     if length == 0.0 {
@@ -251,8 +251,8 @@ impl Point for DVec3 {}
 
 /// The polygon's box at height zero, grown by [`CELL_MARGIN`].
 ///
-/// An empty polygon, whose cell holds no point of the square, gets a point box
-/// outside the square, which region search never enters.
+/// An empty polygon, whose cell contains no point of the square, gets a point box outside the
+/// square, which region search never enters.
 fn planar_bounds(polygon: &[DVec2]) -> Aabb {
     if polygon.is_empty() {
         let beyond = Vec3::splat(f32::from(i16::MAX) * 2.0);
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn sides_follow_the_engine_on_and_off_the_line() {
         let at = DVec2::new;
-        // Upward vertical line: the right is the front, a tie the back.
+        // Upward vertical line: front on the right, ties to the back.
         let up = line(0.0, 0.0, 0.0, 4.0);
         assert_eq!(
             [
@@ -310,7 +310,7 @@ mod tests {
             ],
             [0, 1, 1]
         );
-        // Downward: front and back swap, and so does the tie.
+        // Downward: front and back swap, and so do ties.
         let down = line(0.0, 0.0, 0.0, -4.0);
         assert_eq!(
             [
@@ -338,7 +338,7 @@ mod tests {
             ],
             [1, 0, 1]
         );
-        // By rational arithmetic -5.7e-14, which the rounded products lose.
+        // -5.7e-14 in rational arithmetic; the rounded products lose it.
         let near = line(-149.0, -505.0, 30.0, -19.0);
         assert_eq!(near.side(at(-317.7181021391705, -398.14520197852534)), 0);
         let slope = line(0.0, 0.0, 2.0, 2.0);

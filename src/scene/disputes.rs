@@ -1,9 +1,8 @@
-//! Places about which the linedefs of a map disagree.
+//! Points for which the linedefs of a map disagree about the sector.
 //!
-//! Sectors divide the plane where any two neighbouring linedefs have the same sector, or
-//! none, on the sides that face each other. A sector that refers to itself, a side of a
-//! foreign sector, swapped sides and a missing linedef all break that somewhere.
-//! Integer arithmetic decides, exactly.
+//! Sectors divide the plane if any two neighbouring linedefs have the same sector, or none, on the
+//! sides that face each other. A self-referencing sector, a side with a foreign sector, swapped
+//! sides and a missing linedef all break that somewhere. Decided exactly, in integer arithmetic.
 
 use std::cmp::Ordering;
 
@@ -14,7 +13,7 @@ use crate::query::distinct;
 pub struct Linedef {
     /// Start and end, map units.
     pub ends: [[i32; 2]; 2],
-    /// Effect of crossing or using it; 0 for none.
+    /// Action on crossing or using it; 0 for none.
     pub action: u16,
     /// Tag of the sectors that it acts on.
     pub tag: u16,
@@ -22,7 +21,7 @@ pub struct Linedef {
     pub sectors: [Option<u32>; 2],
 }
 
-/// A place between two linedefs that disagree about it.
+/// A point between two linedefs that disagree about its sector.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error(
     "linedefs disagree about the sector at ({}, {}), {} or {}",
@@ -31,7 +30,7 @@ pub struct Linedef {
 pub struct Dispute {
     /// A point between them, map units.
     pub at: [f64; 2],
-    /// The sector that each has there.
+    /// The sector that each linedef has there.
     pub sectors: [Option<u32>; 2],
 }
 
@@ -39,9 +38,9 @@ fn named(sector: Option<u32>) -> String {
     sector.map_or("none".to_owned(), |sector| sector.to_string())
 }
 
-/// The first dispute of a map between each two sectors.
+/// The first dispute of a map for each pair of sectors.
 ///
-/// None where its sectors divide the plane. O(linedefs * those that a line across the map meets).
+/// None if its sectors divide the plane. O(linedefs * linedefs that a line across the map meets).
 pub fn disputes(lines: &[Linedef]) -> Vec<Dispute> {
     let mut found: Vec<Dispute> = Vec::new();
     for axis in [0, 1] {
@@ -54,21 +53,22 @@ pub fn disputes(lines: &[Linedef]) -> Vec<Dispute> {
     found
 }
 
-/// A linedef across a direction.
+/// A linedef that crosses the direction of a sweep.
 ///
-/// Its ends from low to high in that direction, each with its place across first, and the sectors on its sides of lesser and of greater places.
+/// Its ends from low to high in that direction, each as (position across, level), and the sectors
+/// on its sides of lower and of higher positions.
 struct Edge {
     ends: [[i64; 2]; 2],
     sides: [Option<u32>; 2],
 }
 
 impl Edge {
-    /// `None` for a linedef along the direction, which the other direction crosses.
+    /// `None` for a linedef along a level, which the other direction crosses.
     fn of(line: &Linedef, axis: usize) -> Option<Edge> {
         let turned = |end: [i32; 2]| [end[axis], end[1 - axis]].map(i64::from);
         let (mut ends, mut sides) = (line.ends.map(turned), line.sectors);
         let [from, to] = ends.map(|end| end[1]);
-        // Upwards the left has lesser x; towards larger x the right has lesser y.
+        // Upwards the left side has lower x; towards larger x the right side has lower y.
         if (axis == 0) != (from > to) {
             sides.reverse();
         }
@@ -78,7 +78,7 @@ impl Edge {
         (from != to).then_some(Edge { ends, sides })
     }
 
-    /// Its place across at half of a level, as a fraction: below 2^35 over below 2^18.
+    /// Its position across at `level / 2`, as a fraction: below 2^35 over below 2^18.
     fn place(&self, level: i64) -> [i64; 2] {
         let [from, to] = self.ends;
         let rise = 2 * (to[1] - from[1]);
@@ -86,7 +86,7 @@ impl Edge {
         [from[0] * rise + run, rise]
     }
 
-    /// Which of two comes first at half of a level.
+    /// Order of two edges at `level / 2`.
     fn compared(&self, other: &Edge, level: i64) -> Ordering {
         let ([a, over_a], [b, over_b]) = (self.place(level), other.place(level));
         (a * over_b).cmp(&(b * over_a))
@@ -95,7 +95,7 @@ impl Edge {
 
 /// Finds disputes in the strips between the levels of all ends.
 ///
-/// No edge begins or ends in a strip, so they are passed from edge to edge.
+/// No edge begins or ends within a strip, so edges are compared in order.
 fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)) {
     let edges = lines.iter().filter_map(|line| Edge::of(line, axis));
     let mut edges: Vec<Edge> = edges.collect();
@@ -130,7 +130,7 @@ fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)
     }
 }
 
-/// The sectors that two neighbours of a strip disagree about.
+/// The sectors that two neighbours in a strip disagree about.
 ///
 /// Between them, or where they cross; one of them may be the outside.
 fn disputed(pair: [Option<&Edge>; 2], strip: [i64; 2]) -> Option<[Option<u32>; 2]> {
@@ -164,7 +164,7 @@ mod tests {
         }
     }
 
-    /// A ring whose inside is on the right of each line.
+    /// A ring whose interior is on the right of each line.
     fn ring([x0, y0, x1, y1]: [i32; 4], sectors: [Option<u32>; 2]) -> Vec<Linedef> {
         let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]];
         let sides = (0..4).map(|k| line([corners[k], corners[(k + 1) % 4]], sectors));
@@ -177,7 +177,7 @@ mod tests {
         let with = |sectors| [room.clone(), ring([192, 192, 320, 320], sectors)].concat();
         let proper = with([Some(1), Some(0)]);
         assert_eq!(disputes(&proper), []);
-        // Lines within a sector, even where they cross, divide nothing.
+        // Lines within a sector divide nothing, even where they cross.
         let within = |ends| line(ends, [Some(0); 2]);
         let mut marked = proper.clone();
         marked.extend([[[8, 8], [40, 40]], [[8, 41], [40, 9]]].map(within));
@@ -188,7 +188,7 @@ mod tests {
             first.unwrap_or_default()
         };
         let between = "linedefs disagree about the sector at (96, 256), 0 or 1";
-        // A sector that refers to itself, and one whose lines are the wrong way round.
+        // A self-referencing sector, and one whose lines are reversed.
         assert_eq!(told(&with([Some(1), Some(1)])), between);
         assert_eq!(told(&with([Some(0), Some(1)])), between);
         for at in 0..proper.len() {
@@ -204,7 +204,7 @@ mod tests {
             lines.remove(at);
             assert!(!disputes(&lines).is_empty(), "without {at}");
         }
-        // Rooms that cross without a corner in common.
+        // Rooms that cross without a common corner.
         let other = ring([256, 100, 700, 180], [Some(2), None]);
         assert!(!disputes(&[room, other].concat()).is_empty());
         let none = told(&ring([0, 0, 8, 8], [None, Some(3)]));
@@ -214,7 +214,7 @@ mod tests {
         );
     }
 
-    /// The sector before the nearest line, in four directions from a point.
+    /// The sector in front of the nearest line, in four directions from a point.
     fn looks(lines: &[Linedef], p: [f64; 2]) -> Vec<Option<u32>> {
         let look = |(axis, sign): (usize, f64)| {
             let mut nearest = (f64::INFINITY, None);
@@ -243,7 +243,7 @@ mod tests {
         let mut rng = SeededRng::new(41);
         let mut counts = [0; 2];
         for _ in 0..400 {
-            // A bent grid of cells, some of one sector, some of none.
+            // A distorted grid of cells, some with a common sector, some without any.
             let side = 2 + rng.below(3);
             let corner: Vec<[i32; 2]> = (0..(side + 1) * (side + 1))
                 .map(|k| [k % (side + 1), k / (side + 1)].map(|v| 64 * v as i32))

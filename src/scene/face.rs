@@ -1,4 +1,4 @@
-//! Polygons of three and more corners as triangles.
+//! Triangulation of polygons with three or more corners.
 
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
@@ -7,22 +7,21 @@ use crate::shown::counted;
 
 /// Most corners of a concave face.
 ///
-/// Cutting one that crosses itself takes time in the square of them.
+/// Ear clipping of one that crosses itself takes quadratic time.
 const MOST_CONCAVE: usize = 1000;
-/// Share of a larger face that its fan may cover the wrong way round.
+/// Share of a larger face's area that its fan may cover the wrong way round.
 ///
-/// Corners that are written rounded dent a convex face.
+/// Rounded corners dent a convex face.
 const MOST_WRONG: f64 = 1e-4;
 
 /// Adds the triangles of a face: a fan, or the ears of a concave one.
 ///
-/// They turn as the face does. `face` holds three or more indices of points. A corner that no
-/// ear has, such as the end of a spur, is a triangle of its own, so that the triangles have the
-/// bounds of the face. O(corners); of a concave face up to their square. One of more than
-/// [`MOST_CONCAVE`] corners is a fan where that does not overlap but for rounding.
+/// Their winding is the face's. `face` has three or more indices of points. A corner without an
+/// ear, such as the end of a spur, becomes a triangle of its own, so that the triangles have the
+/// bounds of the face. O(corners); for a concave face up to quadratic. One of more than
+/// [`MOST_CONCAVE`] corners becomes a fan if the fan does not overlap except by rounding.
 ///
-/// # Errors
-/// The words "a concave face of N corners", N above [`MOST_CONCAVE`].
+/// # Errors The words "a concave face of N corners", N above [`MOST_CONCAVE`].
 pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
     let flat = flat_if_concave(points, face);
     let flat = flat.filter(|flat| face.len() <= MOST_CONCAVE || !is_fan(flat));
@@ -45,7 +44,7 @@ pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> 
     Ok(())
 }
 
-/// A face as seen along its normal, if it turns both ways.
+/// A face projected along its normal, if it turns both ways.
 ///
 /// Counter-clockwise; the normal is Newell's.
 fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<DVec2>> {
@@ -70,7 +69,7 @@ fn flat_if_concave(points: &[DVec3], face: &[u32]) -> Option<Vec<DVec2>> {
     is_concave.then(|| all.map(seen).collect())
 }
 
-/// Tests whether the triangles from the first corner hardly overlap.
+/// Tests whether the triangles from the first corner overlap only by rounding.
 fn is_fan(flat: &[DVec2]) -> bool {
     let areas = flat[1..].windows(2);
     let areas = areas.map(|pair| (pair[0] - flat[0]).perp_dot(pair[1] - flat[0]));

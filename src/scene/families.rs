@@ -1,8 +1,7 @@
 //! Generated boxes, a function per family.
 //!
-//! Cities, forests, clusters, layouts of other benchmarks (Bevy's `many_cubes`,
-//! `sseculling`, the trees of bepuphysics), and the extremes of shape: a line, a plane,
-//! piles, a lattice.
+//! Cities, forests, clusters, layouts of other benchmarks (Bevy's `many_cubes`, `sseculling`, the
+//! trees of bepuphysics), and extreme shapes: a line, a plane, piles, a lattice.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +11,7 @@ use super::WorldBox;
 use super::rng::{SeededRng, fractal, mix64, octaves, on_sphere};
 use crate::spec::{Spec, SpecError};
 
-/// The boxes of a family, or a parameter that is wrong.
+/// The boxes of a family, or the error of a parameter.
 pub type Made = Result<Vec<WorldBox>, SpecError>;
 
 /// Boxes scattered evenly in a cube: a scene without structure.
@@ -25,7 +24,7 @@ pub fn uniform(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(scattered(n, rng, DVec3::splat(side), size))
 }
 
-/// Boxes of this mean edge whose centres lie anywhere in a block.
+/// Boxes of this mean edge with centres anywhere in a block.
 fn scattered(n: usize, rng: &mut SeededRng, block: DVec3, size: f64) -> Vec<WorldBox> {
     let boxes = (0..n).map(|_| {
         let centre = rng.point() * block;
@@ -61,10 +60,9 @@ pub fn clustered(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(boxes.collect())
 }
 
-/// Items of one block on average: the city grows with the item count and
-/// keeps its density.
+/// Average number of items per block: a city keeps its density as it grows.
 const ITEMS_PER_BLOCK: f64 = 40.0;
-/// Share of the items that are buildings; the rest stands in the streets.
+/// Share of the items that are buildings; the others stand in the streets.
 const BUILDINGS: f64 = 0.25;
 
 /// The blocks of a city along one axis, and the streets between them.
@@ -148,7 +146,7 @@ const GROUND: f64 = 0.1;
 
 /// A forest: ground tiles, trees, bushes and rocks on a fractal heightfield.
 ///
-/// Flat as a city, but nothing lies on a grid or at one height.
+/// Flat like a city, but nothing lies on a grid or at a common height.
 pub fn forest(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let relief = spec.number_between("relief", 0.12, -1.0, 10.0)?;
     let spacing = spec.number_between("spacing", 5.0, 0.0, f64::INFINITY)?;
@@ -200,7 +198,7 @@ impl Terrain {
         height * self.height
     }
 
-    /// A ground tile: it spans the heights at its corners and centre.
+    /// A ground tile: spans the heights at its corners and centre.
     fn tile(&self, [x, y]: [f64; 2], edge: f64) -> WorldBox {
         let samples = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.5)];
         WorldBox::union_of(samples.map(|(u, v)| {
@@ -212,7 +210,7 @@ impl Terrain {
 
 /// Unit cubes on a spiral over a sphere (Bevy's `many_cubes`).
 ///
-/// From the centre every view of one lens shows about as many.
+/// From the centre every view through the same lens shows about the same number.
 pub fn shell(spec: &mut Spec, n: usize, _: &mut SeededRng) -> Made {
     /// Widens the gaps at the poles (Roberts 2018).
     const POLES: f64 = 0.36;
@@ -254,7 +252,7 @@ pub fn bepu(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(boxes.collect())
 }
 
-/// Boxes scattered evenly in a block that is far longer than wide and high.
+/// Boxes scattered evenly in a block much longer than wide and high.
 pub fn corridor(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let width = spec.number_between("width", 10.0, 0.0, f64::INFINITY)?;
     let length = spec.number_between("length", 1000.0 * width, 0.0, f64::INFINITY)?;
@@ -263,7 +261,7 @@ pub fn corridor(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(scattered(n, rng, block, size))
 }
 
-/// Rectangles of the plane z = 0 that tile a square.
+/// Rectangles that tile a square of the plane z = 0.
 ///
 /// Each cut is across the longer side; neighbours share exact coordinates.
 pub fn tiles2d(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
@@ -289,7 +287,7 @@ pub fn tiles2d(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(boxes)
 }
 
-/// Piles of coincident boxes: no plane separates the items of one.
+/// Piles of coincident boxes: no plane separates the items of a pile.
 pub fn stack(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     let piles = spec.whole("piles", 16, 1..=1_000_000)? as usize;
     let place = |_| WorldBox::around(rng.point() * 1000.0, (rng.point() + 0.5) * 20.0);
@@ -315,12 +313,12 @@ pub fn voxels(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Made {
     Ok(boxes.collect())
 }
 
-/// The cell of that number in a cubic lattice, row by row.
+/// The cell of a number in a cubic lattice, row by row.
 pub fn lattice_cell(i: usize, side: usize) -> DVec3 {
     DVec3::from([i % side, i / side % side, i / side / side].map(|c| c as f64))
 }
 
-/// The least side whose power holds `n` cells; at least 1.
+/// The least side whose power is at least `n`; at least 1.
 fn side_of(n: usize, power: u32) -> usize {
     let root = libm::pow(n as f64, 1.0 / f64::from(power));
     let mut side = (root as usize).saturating_sub(1).max(1);
@@ -391,7 +389,7 @@ mod tests {
         assert!(sides.iter().all(|&(n, side)| side_of(n, 3) == side));
     }
 
-    /// Pairs that overlap in the published test: 65,600 to 66,300 while it runs.
+    /// Overlapping pairs in the published test: 65,600 to 66,300 while it runs.
     #[test]
     fn boxes_of_bepu_overlap_about_as_often_as_published() {
         let mut all = boxes(bepu, "bepu", 65_536);

@@ -1,7 +1,7 @@
 //! The tables of generated worlds, and their common parameters.
 //!
-//! Boxes are made in `families` and `rooms`, meshes in `meshes`; adding one is a function
-//! there and a row here.
+//! Boxes are made in `families` and `rooms`, meshes in `meshes`; adding one takes a function there
+//! and a row here.
 
 use super::meshes::{ground, spheres};
 use super::rng::SeededRng;
@@ -10,10 +10,10 @@ use super::{Regions, Scene, Surfaces, families, rooms};
 use crate::input::Result;
 use crate::spec::{Spec, SpecError};
 
-/// The random generator behind every seeded choice.
+/// The random generator of every seeded choice.
 ///
-/// Its stream is fixed by its definition (O'Neill 2014, PCG XSL RR 128/64), so the same
-/// seed gives the same scene on every machine.
+/// Its stream is fixed by its definition (O'Neill 2014, PCG XSL RR 128/64), so the same seed gives
+/// the same scene on every machine.
 pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
@@ -85,8 +85,9 @@ pub const SCENE_PARAMS: &str = "n=100000, seed=1, offset=0";
 
 /// Default of `n`.
 pub(crate) const COUNT: u64 = 100_000;
-/// Most items or triangles of a scene: 12 GB while boxes are made, 7.2 GB then; the
-/// corners of triangles fit u32.
+/// Most items or triangles of a scene.
+///
+/// 12 GB while boxes are made, 7.2 GB afterwards; indices of corners fit u32.
 pub(super) const MOST: u64 = 100_000_000;
 
 impl Family {
@@ -175,8 +176,9 @@ mod tests {
         }
     }
 
-    /// Pinned digests: a change of any generated world is a change of every
-    /// published figure and belongs into the CHANGELOG.
+    /// Pinned digests of generated worlds.
+    ///
+    /// Changing a world changes every published figure and belongs in the CHANGELOG.
     #[test]
     fn generated_worlds_are_the_published_ones() {
         let digests: Vec<_> = FAMILIES
@@ -216,7 +218,7 @@ mod tests {
             for (key, default) in &listed {
                 let parameter = match key.as_str() {
                     "n" => "n=20".to_owned(),
-                    // Follows from the others.
+                    // Derived from the other parameters.
                     _ if default.contains('*') => format!("n=20,{key}=1"),
                     _ => format!("n=20,{key}={default}"),
                 };

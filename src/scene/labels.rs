@@ -1,12 +1,12 @@
 //! Further columns of a boxes file, kept as labels: texts and a number per item.
 //!
-//! Each of a few distinct texts is kept once. Where they are many, as names and ids are, further
+//! Each of a few distinct texts is stored once. If there are many, such as names and ids, further
 //! ones are not looked up.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 
-/// Texts that are looked up.
+/// Most texts that are looked up.
 const MOST_KNOWN: usize = 4096;
 
 /// One labelled column, such as `kind`.
@@ -14,10 +14,10 @@ const MOST_KNOWN: usize = 4096;
 pub struct Labels {
     /// Name of the column.
     pub column: String,
-    /// The texts, one behind the other, and the end of each.
+    /// The texts, concatenated, and the end of each.
     texts: String,
     ends: Vec<usize>,
-    /// Numbers of the first texts.
+    /// Numbers of the texts that are looked up.
     numbers: HashMap<Box<str>, u32>,
     of_item: Vec<u32>,
 }
@@ -33,7 +33,7 @@ impl Labels {
 
     /// Labels the next item.
     ///
-    /// Zero bytes, which no CSV file may have, become replacement characters.
+    /// Zero bytes, which no CSV file may contain, become replacement characters.
     pub fn push(&mut self, value: &str) {
         let known = self.numbers.get(value).copied();
         let number = known.unwrap_or_else(|| {
@@ -48,7 +48,7 @@ impl Labels {
         self.of_item.push(number);
     }
 
-    /// The labels of some of the items, any of them several times.
+    /// The labels of some of the items, which may repeat.
     pub fn of(&self, items: &[u32]) -> Labels {
         let number = |&item: &u32| self.of_item[item as usize];
         Labels {

@@ -1,7 +1,7 @@
 //! Memory that a scene needs, and memory that is free.
 //!
-//! A scene that does not fit is refused before it is made, as a machine that swaps measures
-//! nothing.
+//! A scene that does not fit is refused before it is made, since measurements are worthless on a
+//! machine that swaps.
 
 use std::fs;
 use std::path::Path;
@@ -12,23 +12,24 @@ use super::{LoadOptions, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::{InputError, Result, gigabytes};
 
-/// Bytes of an item in a scene: as indexes hold it, and as it was written.
+/// Bytes of an item in a scene: rounded for indexes, and as written.
 const HELD: u64 = (size_of::<Aabb>() + size_of::<WorldBox>()) as u64;
-/// Bytes of an item while the scene is made: the written box is there twice.
+/// Bytes of an item while the scene is made: the written box exists twice.
 const MADE: u64 = HELD + size_of::<WorldBox>() as u64;
-/// Bytes of an item in a structure; 28 to 39 were measured, 54 of `moving`.
+/// Bytes of an item in a structure; measured: 28 to 39, and 54 for `moving`.
 const INDEXED: u64 = 40;
-/// Bytes of an item that a build needs beside its structure.
+/// Bytes of an item that a build needs in addition to its structure.
 const BUILT: u64 = 64;
-/// Scenes of fewer items, and meshes of fewer triangles, are made without a check.
+/// Number of items or triangles up to which a scene is not checked.
 pub const ANYWHERE: u64 = 10_000;
-/// Bytes of a triangle while a mesh is made: 117 were measured of the statue, which
-/// finds its points in a table, 20 to 24 of the others.
+/// Bytes of a triangle while a mesh is made.
+///
+/// Measured: 117 for the statue, which looks up its points in a table, 20 to 24 for the others.
 const MESHED: u64 = 120;
 /// Fewest triangles of an item: those of a bush.
 const FEWEST: u64 = 24;
 
-/// About how many bytes a scene takes with `structures` over it.
+/// Approximate bytes of a scene with `structures` built over it.
 fn needed_by_items(items: u64, structures: u64) -> u64 {
     let built = if structures > 0 { BUILT } else { 0 };
     items.saturating_mul(MADE.max(HELD + structures * INDEXED + built))
@@ -37,10 +38,9 @@ fn needed_by_items(items: u64, structures: u64) -> u64 {
 impl LoadOptions {
     /// Refuses a scene that would not fit into memory.
     ///
-    /// Items are estimated from the triangles where they are not counted.
+    /// The number of items is estimated from the triangles if it is unknown.
     ///
-    /// # Errors
-    /// The sizes needed and free.
+    /// # Errors The sizes needed and free.
     pub fn check_fits(&self, scene: &str, items: Option<u64>, triangles: u64) -> Result<()> {
         let made = needed_by_items(items.unwrap_or(triangles / FEWEST), self.structures);
         let needed = made.saturating_add(triangles.saturating_mul(MESHED + self.per_triangle));
@@ -51,10 +51,9 @@ impl LoadOptions {
 
 /// Refuses a scene that needs more bytes than are free.
 ///
-/// A scene of few items or triangles (`count`) passes, and any scene where the free bytes are not known.
+/// A scene of few items or triangles (`count`) passes, and any scene if the free memory is unknown.
 ///
-/// # Errors
-/// The sizes needed and free.
+/// # Errors The sizes needed and free.
 pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Result<()> {
     let available = (count > ANYWHERE).then(available_bytes).flatten();
     fits(scene, needed, structures, available)
@@ -70,7 +69,7 @@ fn fits(scene: &str, needed: u64, structures: u64, available: Option<u64>) -> Re
     fits_into(available, [scene, &held, &expected], needed)
 }
 
-/// Refuses what needs more memory than is available; unknown memory is no reason.
+/// Refuses what needs more memory than is available; accepts if that is unknown.
 pub(crate) fn fits_into(
     available: Option<u64>,
     [what, held, expected]: [&str; 3],
@@ -86,7 +85,7 @@ pub(crate) fn fits_into(
     }
 }
 
-/// Bytes that the system, the control groups and the limits of this process leave.
+/// Bytes left by the system, the control groups and the limits of this process.
 pub(crate) fn available_bytes() -> Option<u64> {
     let wanted = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(wanted).ok();
@@ -105,13 +104,13 @@ pub(crate) fn available_bytes() -> Option<u64> {
 /// Address space for the allocator and the stack of another thread.
 const THREADS: u64 = 80 << 20;
 
-/// The number behind a name at the beginning of a line; `None` for "unlimited".
+/// The number after a name at the start of a line; `None` for "unlimited".
 fn figure(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// Bytes that `ulimit -v` and `ulimit -d` leave.
+/// Bytes left by `ulimit -v` and `ulimit -d`.
 ///
 /// From the process's own files of limits and status.
 fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
@@ -124,9 +123,9 @@ fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
     address_space.into_iter().chain(data).min()
 }
 
-/// Bytes that the control groups of a process and their ancestors leave.
+/// Bytes left by the control groups of a process and their ancestors.
 ///
-/// Pages of files that can be dropped are free. Version 2, where the line names no controller, or 1.
+/// File pages that can be dropped count as free. Version 2 if the line names no controller, else 1.
 fn left_in_groups(root: &Path, groups: &str) -> Option<u64> {
     const V1: [&str; 3] = [
         "memory.limit_in_bytes",
@@ -174,7 +173,7 @@ mod tests {
         let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
         let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected a smaller input";
         assert_eq!(told, wanted);
-        // Structures count, and the line says how many.
+        // Structures count, and the message says how many.
         assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);
         let told = refused(100_000_000, 8, Some(13 * gigabyte)).expect("refused");
         assert!(
@@ -232,7 +231,7 @@ mod tests {
             "inactive_file 5\ntotal_inactive_file 10\n",
         );
         assert_eq!(left("9:cpu:/\n4:hugetlb,memory:/c\n0::/a/b\n"), Some(310));
-        // Within a container the path is the host's: what is mounted is the limit.
+        // Within a container the path is the host's: the mounted files are the limit.
         write("memory/memory.limit_in_bytes", "90\n");
         write("memory/memory.usage_in_bytes", "100\n");
         assert_eq!(left("4:memory:/docker/1\n"), Some(0));

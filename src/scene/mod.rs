@@ -1,10 +1,9 @@
-//! A scene: boxes in local f32 coordinates about an f64 origin.
+//! A scene: boxes in local f32 coordinates relative to an f64 origin.
 //!
-//! Also the triangles of a mesh, the regions for region search, and the scene's own camera
-//! places.
+//! Also the triangles of a mesh, the regions for region search, and the scene's own camera places.
 //!
-//! Generators and readers have a file each; this file defines their common output
-//! and the choice of the origin.
+//! Generators and readers have a file each; this file defines their common output and the choice of
+//! the origin.
 
 mod boxes_csv;
 mod bsp;
@@ -71,7 +70,7 @@ pub use written::{Originals, Sought, SoughtBox};
 #[cfg(test)]
 pub(crate) use zip::tests::packed;
 
-/// A box in world coordinates, as a file or a generator states it.
+/// A box in world coordinates, as stated by a file or a generator.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct WorldBox {
     /// Lower corner; bounds are closed.
@@ -81,7 +80,7 @@ pub struct WorldBox {
 }
 
 impl WorldBox {
-    /// No box of its own: that of an item as it is stored.
+    /// A NaN box: the item's written box is the stored one.
     pub(crate) const AS_STORED: WorldBox = WorldBox {
         min: DVec3::NAN,
         max: DVec3::NAN,
@@ -92,7 +91,7 @@ impl WorldBox {
         WorldBox { min, max }
     }
 
-    /// Tests whether a box about `origin` is this very box.
+    /// Tests whether a box stored relative to `origin` equals this one exactly.
     pub(crate) fn is_stored_as(&self, stored: &Aabb, origin: DVec3) -> bool {
         let corners = [(self.min, stored.min), (self.max, stored.max)];
         corners.into_iter().all(|(written, stored)| {
@@ -100,7 +99,7 @@ impl WorldBox {
         })
     }
 
-    /// The smallest box that holds all of some: inverted for none.
+    /// The smallest box that contains all of `boxes`; inverted for none.
     pub fn union_of(boxes: impl IntoIterator<Item = WorldBox>) -> Self {
         let none = WorldBox::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
         boxes.into_iter().fold(none, |all, b| {
@@ -124,9 +123,9 @@ impl WorldBox {
         WorldBox::new(min, max)
     }
 
-    /// The largest box within one about an origin; empty where there is none.
+    /// The largest box within a scene-local one; empty if there is none.
     pub fn within(b: &Aabb, origin: DVec3) -> Self {
-        // Outward, of what is inside out.
+        // Rounded outward with corners swapped: inward.
         let (max, min) = Aabb::new(b.max, b.min).in_world(origin);
         WorldBox::new(min, max)
     }
@@ -148,20 +147,20 @@ impl WorldBox {
 pub enum Regions {
     /// The items themselves: closed boxes that may overlap.
     ///
-    /// A point belongs to every one that holds it.
+    /// A point belongs to every region that contains it.
     #[default]
     Items,
-    /// Boxes that tile a volume, joined by portals.
+    /// Boxes that tile a volume, connected by portals.
     ///
     /// Closed as well: a point on a shared wall belongs to both sides.
     Tiling(Tiling),
     /// The leaves of a map's own 2-D BSP tree.
     ///
-    /// Every point of the map belongs to exactly one, whatever its height.
+    /// Every point of the map belongs to exactly one, at any height.
     Bsp(Arc<WadMap>),
     /// The open leaves of a map's own BSP tree.
     ///
-    /// A point belongs to one, or to none if it lies in the solid.
+    /// A point belongs to one, or to none if it is in the solid.
     Leaves(Arc<QuakeMap>),
 }
 
@@ -178,7 +177,7 @@ impl Regions {
         }
     }
 
-    /// The boxes that hold a local point, found by testing each.
+    /// The boxes that contain a local point, found by testing each.
     ///
     /// The answer an index must give. Ascending ids.
     pub fn holding(&self, p: Vec3, items: &[Aabb]) -> Vec<ItemId> {
@@ -187,9 +186,9 @@ impl Regions {
         holding.map(|(_, id)| id).collect()
     }
 
-    /// The leaf of a map that holds a point relative to the scene's origin.
+    /// The leaf of a map that contains a point relative to the scene's origin.
     ///
-    /// `None` where the regions are boxes.
+    /// `None` if the regions are boxes.
     pub fn leaf_at(&self, p: DVec3) -> Option<Option<ItemId>> {
         match self {
             Regions::Bsp(map) => Some(map.tree.descend(p.truncate())),
@@ -216,17 +215,17 @@ pub struct Scene {
     pub name: String,
     /// Axis that points up.
     pub up: UpAxis,
-    /// Unit of coordinates; `None` where the file does not say.
+    /// Unit of coordinates; `None` if the file does not state it.
     pub unit: Option<&'static str>,
-    /// Zero of the local coordinates, in the world.
+    /// Origin of the local coordinates, in world coordinates.
     pub origin: DVec3,
-    /// Item bounds, rounded outward about the origin; the id is the index.
+    /// Item bounds, rounded outward relative to the origin; the id is the index.
     pub items: Vec<Aabb>,
-    /// The items as they were written, where f32 holds any of them otherwise.
+    /// The items as written, if f32 changes any of them.
     pub originals: Originals,
     /// Union of the items, local.
     pub bounds: Aabb,
-    /// The triangles that the items are the boxes of, if the scene is a mesh.
+    /// The triangles of the items, if the scene is a mesh.
     pub surfaces: Option<Arc<Surfaces>>,
     /// Targets of region search.
     pub regions: Regions,
@@ -234,13 +233,13 @@ pub struct Scene {
     pub labels: Vec<Labels>,
     /// Camera places that the scene offers, for the path `places`.
     pub places: Vec<CameraPlace>,
-    /// The camera that an animation of the file moves, or why it cannot be read.
+    /// The camera that the file's animation moves, or why it cannot be read.
     pub animation: Option<Arc<Result<CameraAnimation>>>,
-    /// The partition that the scene's file brings, local coordinates.
+    /// The partition in the scene's file, local coordinates.
     pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
-    /// Data row of each item, ascending, where some were left out; else empty.
+    /// Data row of each item, ascending; empty if none were left out.
     pub rows: Vec<ItemId>,
 }
 
@@ -250,7 +249,7 @@ impl Scene {
         self.rows.get(item as usize).copied().unwrap_or(item)
     }
 
-    /// The ids that items have in files, in words: `0 to 9`.
+    /// The ids of items in files, in words: `0 to 9`.
     pub fn ids(&self) -> String {
         let left_out = ["", " without the rows left out"][usize::from(self.skipped_items > 0)];
         match self.items.len().checked_sub(1) {
@@ -268,16 +267,15 @@ impl Scene {
         item.map(|item| item as ItemId)
     }
 
-    /// Rounds the boxes outward about the origin that suits them.
+    /// Rounds the boxes outward relative to an origin chosen for them.
     ///
-    /// # Errors
-    /// The first box that is not finite, inverted or too large for f32.
+    /// # Errors The first box that is not finite, inverted or too large for f32.
     pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene> {
         let origin = choose_origin(boxes.iter().copied());
         Scene::about(name, boxes, origin)
     }
 
-    /// The same about a given origin.
+    /// Rounds the boxes outward relative to a given origin.
     pub fn about(name: impl Into<String>, boxes: &[WorldBox], origin: DVec3) -> Result<Scene> {
         let name = name.into();
         let rounded = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
@@ -310,11 +308,10 @@ impl Scene {
         WorldBox::new(self.origin + min, self.origin + max)
     }
 
-    /// SHA-256 over the origin and the bounds of the items.
+    /// SHA-256 over the origin and the bounds of the items. O(n).
     ///
-    /// Also over the boxes as they were written where f32 holds them otherwise: two scenes
-    /// with the same digest ask the same questions of every structure, and the answers are
-    /// judged by the same truth. O(n).
+    /// Also over the boxes as written if f32 changes them: two scenes with the same digest pose the
+    /// same queries to every structure, and the answers are compared with the same truth.
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
         let le_bytes = |corner: DVec3| corner.to_array().map(f64::to_le_bytes).concat();
@@ -331,12 +328,11 @@ impl Scene {
     }
 }
 
-/// The origin that suits the boxes, by the finite ones.
+/// The origin for boxes, chosen by the finite ones.
 ///
-/// Zero on every axis where moving the boxes would gain no more than some three bits:
-/// their coordinates then stay as written and exact ties stay ties. Otherwise
-/// the centre, rounded to a power of two near the width, so that round
-/// coordinates stay round.
+/// Zero on every axis where translation would gain no more than about three bits: coordinates then
+/// stay as written and exact ties stay ties. Otherwise the centre, rounded to a power of two near
+/// the width, so that round coordinates stay round.
 fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
     let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
     let bounds = WorldBox::union_of(finite);
@@ -350,7 +346,7 @@ fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
         let floor = centre.abs() * f64::EPSILON;
         let grid = libm::exp2(libm::floor(libm::log2(width.max(floor))));
         match grid {
-            // Nearer to zero than f64 can divide by.
+            // Too close to zero for f64 to divide by.
             0.0 => 0.0,
             grid => (centre / grid).round() * grid,
         }
@@ -358,7 +354,7 @@ fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
     [0, 1, 2].map(axis).into()
 }
 
-/// An error of an item of a scene that was not read from a file.
+/// The error of an item of a scene that was not read from a file.
 fn bad_item(scene: &str, item: usize, found: fmt::Arguments, expected: &str) -> InputError {
     let place = format!("scene '{scene}', item {item}");
     InputError::new(format_args!("{place}: {found}; expected {expected}"))
@@ -421,11 +417,11 @@ mod tests {
         let (low, high) = (scene(0.0, 0.1), scene(0.0, 0.1f64.next_up()));
         assert_eq!((low.origin, &low.items), (high.origin, &high.items));
         assert_ne!(low.digest(), high.digest());
-        // What f32 holds is a third one.
+        // A third one: the box that f32 holds.
         let held = scene(0.0, low.items[0].max.x.into());
         assert_eq!(low.items, held.items);
         assert!(![low.digest(), high.digest()].contains(&held.digest()));
-        // Its digest is that of origin and bounds alone.
+        // Its digest covers only origin and bounds.
         let mut bytes = vec![0; 24];
         for corner in [held.items[0].min, held.items[0].max] {
             bytes.extend(corner.to_array().map(f32::to_le_bytes).concat());

@@ -1,13 +1,13 @@
 //! Wavefront OBJ: every object or group with faces is an item.
 //!
-//! A group that is opened again is another item of the same name.
-//! Faces become opaque triangles, counter-clockwise as seen from the outside: fans, or ears
-//! of a concave face. Boxes hold the vertices as written. Weights and colours of vertices, normals and texture
-//! coordinates change nothing. Source: Wavefront Technologies, Advanced Visualizer Manual,
-//! appendix B1, "Object Files (.obj)".
+//! A group that is opened again is another item of the same name. Faces become opaque triangles,
+//! counter-clockwise as seen from the outside: fans, or ears of a concave face. Boxes contain the
+//! vertices as written. Weights and colours of vertices, normals and texture coordinates have no
+//! effect. Source: Wavefront Technologies, Advanced Visualizer Manual, appendix B1, "Object Files
+//! (.obj)".
 //!
-//! A reader of our own: the crate tobj (4.0.5) panics in debug builds on `f 1/-5 2/-5 3/-5`, makes
-//! triangles of `l 1 2 3 4`, and checks indices where the line is lost.
+//! Our own reader: the crate tobj (4.0.5) panics in debug builds on `f 1/-5 2/-5 3/-5`, makes
+//! triangles of `l 1 2 3 4`, and checks indices without knowing the line.
 
 use std::collections::BTreeSet;
 use std::fmt::Display;
@@ -20,16 +20,16 @@ use super::{Labels, LoadOptions, Scene, Surfaces, UpAxis, WorldBox, choose_origi
 use crate::input::{InputError, Result, finite, note};
 use crate::shown::{counted, first_of, shortened};
 
-/// First words of lines whose meaning is known here.
+/// First words of lines that are interpreted.
 const KNOWN: [&[u8]; 8] = [b"v", b"f", b"o", b"g", b"vt", b"vn", b"vp", b"s"];
-/// First words of lines that are named as not read.
+/// First words of lines that are reported as not read.
 const UNREAD: [&[u8]; 4] = [b"mtllib", b"usemtl", b"l", b"p"];
 /// Bytes in memory per byte of a file that is one large polygon.
 const BYTES_PER_BYTE: u64 = 12;
 /// Most unread words that are counted.
 const MOST_UNREAD: usize = 100;
 
-/// Tells OBJ by the first word that is no comment and no header of boxes CSV.
+/// Recognises OBJ by the first word that is no comment and no header of boxes CSV.
 pub fn is_obj(bytes: &[u8]) -> bool {
     let lines = text(bytes).split(|byte| matches!(byte, b'\n' | b'\r'));
     let mut lines = lines.map(|line| line.trim_ascii());
@@ -44,9 +44,8 @@ pub fn is_obj(bytes: &[u8]) -> bool {
 
 /// Reads a scene; y is up unless the options say otherwise.
 ///
-/// # Errors
-/// The first line with numbers that are none, or with a vertex that is not there; a file
-/// without faces; a scene that does not fit into memory or into f32.
+/// # Errors The first line with invalid numbers or a missing vertex; a file without faces; a scene
+/// that does not fit into memory or into f32.
 pub fn read_obj(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let size = bytes.len() as u64;
     let needed = size.saturating_mul(BYTES_PER_BYTE);
@@ -97,7 +96,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     words.filter(|word| !word.is_empty())
 }
 
-/// Returns a line with those that backslashes at ends add, and their number.
+/// Returns a line with its continuations by backslashes, and their number.
 ///
 /// A comment ends with its line.
 fn first_line(text: &[u8]) -> (&[u8], u64) {
@@ -180,7 +179,7 @@ impl Obj<'_> {
                 self.items.pop_if(|(_, first)| *first == self.corners.len());
                 match word {
                     b"o" => self.object.clone_from(&name),
-                    // A group without a name is a part of its object.
+                    // A group without a name is part of its object.
                     _ if name.is_empty() => name.clone_from(&self.object),
                     _ => {}
                 }
@@ -245,7 +244,7 @@ mod tests {
     use super::super::SeededRng;
     use super::*;
 
-    /// Triangles in four groups, one of them empty, and all that is passed over.
+    /// Triangles in four groups, one of them empty, and everything that is skipped.
     const TEXT: &str = "\u{feff}# made by hand \\
 mtllib none.mtl
 o solid
@@ -290,7 +289,7 @@ f 1 2 3 4";
             [0.1, 0.0, 3.0],
         ];
         let points = points.map(|[x, y, z]| DVec3::new(1e6 + x, y, z));
-        // As written, so 1000000.1 and not its neighbour by addition.
+        // As written: 1000000.1 and not its neighbour by addition.
         let written = [1_000_000.1, 1_000_001.7];
         for (item, b) in scene.items.iter().enumerate() {
             let all = WorldBox::union_of(points.map(WorldBox::at));

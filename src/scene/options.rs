@@ -1,9 +1,9 @@
-//! Choices of a user that all readers of scenes share, up axes and camera places.
+//! Options that all readers of scenes share, up axes and camera places.
 
 use glam::{DVec3, Vec3Swizzles};
 
 named! {
-    /// Parts of a scene that are its items.
+    /// The items of a scene: parts of it.
     #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
     pub enum ItemKind, ITEM_KINDS {
         #[default] Objects = "objects", "objects, groups and nodes of the file";
@@ -16,15 +16,15 @@ named! {
 /// How to read a scene.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct LoadOptions {
-    /// Leave out rows that are no finite box, and count them.
+    /// Leave out rows that are not a finite box, and count them.
     pub skip_bad_items: bool,
     /// Up axis of formats that do not state it.
     pub up: Option<UpAxis>,
     /// Items of a scene with triangles.
     pub items: ItemKind,
-    /// Structures that will be built over the scene: they need memory as well.
+    /// Number of structures that will be built over the scene: they need memory too.
     pub structures: u64,
-    /// Bytes that will be needed for each triangle of a mesh, beside the scene.
+    /// Bytes needed per triangle of a mesh, in addition to the scene.
     pub per_triangle: u64,
 }
 
@@ -43,9 +43,9 @@ impl UpAxis {
         self.from_z_up(DVec3::Z)
     }
 
-    /// Exchanges the axes of a vector of the scene so that z is up.
+    /// Permutes the axes of a vector of the scene so that z is up.
     ///
-    /// A turn: right-handed stays right-handed, and no coordinate is rounded.
+    /// A rotation: handedness is kept, and no coordinate is rounded.
     pub fn to_z_up<V: Vec3Swizzles>(self, v: V) -> V {
         match self {
             UpAxis::Y => v.zxy(),
@@ -62,14 +62,14 @@ impl UpAxis {
     }
 }
 
-/// A place and direction that the scene itself offers to a camera.
+/// A position and direction that the scene itself offers to a camera.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CameraPlace {
     /// Position in world coordinates.
     pub eye: DVec3,
     /// Direction of view.
     pub forward: DVec3,
-    /// Roll and lens, where the file states them.
+    /// Roll and lens, if the file states them.
     pub view: Option<PlaceView>,
 }
 
@@ -78,7 +78,7 @@ pub struct CameraPlace {
 pub struct PlaceView {
     /// Direction that is up in the image.
     pub up: DVec3,
-    /// Full vertical angle of view in degrees; `None` where the view is parallel.
+    /// Full vertical angle of view in degrees; `None` for a parallel view.
     pub fovy_deg: Option<f64>,
     /// Height of a parallel view in world units.
     pub ortho_height: Option<f64>,

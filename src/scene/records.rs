@@ -1,4 +1,4 @@
-//! Tables of records of one size in binary files, little-endian.
+//! Tables of fixed-size records in binary files, little-endian.
 //!
 //! No byte is trusted.
 
@@ -16,12 +16,12 @@ pub struct Table<'a> {
     /// Offset of its first byte in the file.
     pub start: usize,
     pub data: &'a [u8],
-    /// Bytes of a record, which `data` is a multiple of.
+    /// Bytes per record; `data` is a multiple of it.
     pub record: usize,
 }
 
 impl<'a> Table<'a> {
-    /// Some bytes of a file, each a record.
+    /// Some bytes of a file, one record per byte.
     pub fn new(file: &'a str, name: &'static str, bytes: &'a [u8], range: Range<usize>) -> Self {
         Table {
             file,
@@ -32,9 +32,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The bytes whose offset and number stand at the entry of a directory.
+    /// The bytes whose offset and length are in an entry of a directory.
     ///
-    /// An empty table is at its entry: its offset means nothing.
+    /// An empty table starts at its entry: its offset is meaningless.
     pub fn of_entry(
         file: &'a str,
         name: &'static str,
@@ -54,7 +54,7 @@ impl<'a> Table<'a> {
         Ok(Table::new(file, name, bytes, range))
     }
 
-    /// The same bytes as records of a size.
+    /// The same bytes as records of a given size.
     pub fn of_records(self, record: usize) -> Result<Self> {
         let size = self.data.len();
         match size.is_multiple_of(record) {
@@ -96,7 +96,7 @@ impl<'a> Table<'a> {
         Vec3::from([0, 4, 8].map(|part| self.int(i, at + part) as f32))
     }
 
-    /// A finite number of f32.
+    /// A finite f32.
     pub fn float(&self, i: usize, at: usize) -> Result<f32> {
         let value = f32::from_bits(self.int(i, at) as u32);
         match value.is_finite() {
@@ -105,18 +105,18 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Three finite numbers of f32.
+    /// Three finite f32.
     pub fn vector(&self, i: usize, at: usize) -> Result<Vec3> {
         let part = |part| self.float(i, at + part);
         Ok(Vec3::new(part(0)?, part(4)?, part(8)?))
     }
 
-    /// A 16-bit field that counts records of another table.
+    /// A 16-bit index into another table.
     pub fn index16(&self, i: usize, at: usize, of: &Table) -> Result<usize> {
         self.below(i, at, self.word(i, at).into(), of)
     }
 
-    /// A 32-bit field that counts records of another table.
+    /// A 32-bit index into another table.
     pub fn index(&self, i: usize, at: usize, of: &Table) -> Result<usize> {
         self.below(i, at, self.int(i, at), of)
     }
@@ -131,7 +131,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Two 32-bit fields, the first of some records of another table and their count.
+    /// A range of another table's records, as two 32-bit fields: first and count.
     pub fn range(&self, i: usize, at: usize, of: &Table) -> Result<Range<usize>> {
         let [first, count] = [at, at + 4].map(|at| self.int(i, at));
         range_within(first, count, of.len()).ok_or_else(|| {
@@ -152,7 +152,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The range of `count` numbers from `first` on, if all are below a limit.
+/// The range of `count` numbers from `first` on, if all are below `limit`.
 pub fn range_within(first: i32, count: i32, limit: usize) -> Option<Range<usize>> {
     let (first, count) = (usize::try_from(first).ok()?, usize::try_from(count).ok()?);
     let range = first..first.checked_add(count)?;

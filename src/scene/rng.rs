@@ -32,7 +32,7 @@ impl SeededRng {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }
 
-    /// Puts all in random order (Fisher and Yates, as Durstenfeld 1964 has it).
+    /// Shuffles a slice (Fisher and Yates, in Durstenfeld's form of 1964).
     pub fn shuffle<T>(&mut self, all: &mut [T]) {
         for last in (1..all.len()).rev() {
             all.swap(last, self.below(last + 1));
@@ -58,7 +58,7 @@ impl SeededRng {
     }
 }
 
-/// The point of the unit sphere at a height, turned about the axis of z.
+/// The point of the unit sphere at height `z`, rotated about the z axis.
 pub fn on_sphere(z: f64, turn: f64) -> DVec3 {
     let radius = (1.0 - z * z).sqrt();
     DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z)
@@ -72,7 +72,7 @@ pub fn mix64(key: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Smooth noise between the values at the corners of a lattice of unit cells.
+/// Smooth noise that interpolates values at the corners of a unit lattice.
 fn noise(p: DVec3, corner: impl Fn(IVec3) -> f64) -> f64 {
     let cell = p.floor();
     let smooth = (p - cell) * (p - cell) * (DVec3::splat(3.0) - (p - cell) * 2.0);

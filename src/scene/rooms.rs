@@ -1,7 +1,7 @@
-//! An indoor block: storeys of box-shaped rooms joined by doors.
+//! An indoor block: storeys of box-shaped rooms connected by doors.
 //!
-//! The rooms tile the block and are the regions of region search; the doors are the portals
-//! between them; slabs, walls and furniture are the items.
+//! The rooms tile the block and are the regions of region search; the doors are the portals between
+//! them; slabs, walls and furniture are the items.
 
 use glam::DVec3;
 
@@ -16,7 +16,7 @@ use crate::spec::{Spec, SpecError};
 pub struct Tiling {
     /// Boxes in scene coordinates; the id is the index.
     pub boxes: Vec<Aabb>,
-    /// The boxes as they were made, where f32 holds any of them otherwise.
+    /// The boxes as written, if f32 changes any of them.
     pub originals: Originals,
     /// Openings between neighbours.
     pub portals: Vec<Portal>,
@@ -27,15 +27,15 @@ pub struct Tiling {
 pub struct Portal {
     /// Ids of the two regions.
     pub between: [ItemId; 2],
-    /// Box through which one sees from one into the other, in scene coordinates.
+    /// Box of the opening between the two, in scene coordinates.
     pub opening: Aabb,
 }
 
-/// A generated world, in world coordinates: boxes, and the rooms that they enclose.
+/// A generated world, in world coordinates: boxes, and the rooms they enclose.
 #[derive(Default)]
 pub struct World {
     pub boxes: Vec<WorldBox>,
-    /// Regions of the scene; none if the regions are the items.
+    /// Regions of the scene; empty if the regions are the items.
     pub rooms: Vec<WorldBox>,
     /// Openings, each with the indices of its two rooms.
     pub doors: Vec<([ItemId; 2], WorldBox)>,
@@ -50,7 +50,7 @@ impl World {
         }
     }
 
-    /// The rooms and doors about the origin of a scene.
+    /// The rooms and doors relative to the origin of a scene.
     pub fn tiling(&self, origin: DVec3) -> Tiling {
         let local = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
         let boxes: Vec<Aabb> = self.rooms.iter().map(local).collect();
@@ -70,7 +70,7 @@ const STOREY_HEIGHT: f64 = 3.0;
 const WALL: f64 = 0.2;
 const DOOR_WIDTH: f64 = 1.0;
 const DOOR_HEIGHT: f64 = 2.1;
-/// Items of a room on average, furniture included.
+/// Average number of items per room, furniture included.
 const ITEMS_PER_ROOM: usize = 16;
 
 pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
@@ -79,8 +79,8 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
     let wanted = n.div_ceil(ITEMS_PER_ROOM).max(1);
     let storeys = storeys.min(wanted);
     let per_side = ((wanted / storeys) as f64).sqrt().floor().max(1.0) as usize;
-    // Wall lines at jittered multiples of a quarter of a metre: doors fit,
-    // and walls of neighbouring rooms share exact coordinates.
+    // Wall lines at jittered multiples of a quarter of a metre: doors fit, and walls of
+    // neighbouring rooms share exact coordinates.
     let mut lines = || {
         let jitter = (edge - 2.0 * DOOR_WIDTH) / 2.0;
         let mut at = 0.0;
@@ -103,7 +103,7 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
                 let id = world.rooms.len();
                 let room = WorldBox::new(low, high);
                 boxes.push(WorldBox::new(low, DVec3::new(high.x, high.y, low.z + WALL)));
-                // The walls towards the rooms before this one carry doors.
+                // The walls towards rooms with lower indices have the doors.
                 for (axis, first, before) in [(0, i == 0, 1), (1, j == 0, per_side)] {
                     let door = door_in(&room, axis, rng);
                     push_wall(boxes, &room, axis, (!first).then_some(&door));
@@ -121,7 +121,7 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
         let room = world.rooms[rng.below(world.rooms.len())];
         boxes.push(furniture(&room, rng));
     }
-    // Storeys are joined by one stairwell: the first room of each.
+    // Storeys are connected by one stairwell: the first room of each.
     let per_storey = per_side * per_side;
     for storey in 1..storeys {
         let (below, above) = ((storey - 1) * per_storey, storey * per_storey);
@@ -134,7 +134,7 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
     Ok(world)
 }
 
-/// The door in the room's low wall across `axis`: flat in that axis.
+/// The door in the room's low wall across `axis`: flat on that axis.
 fn door_in(room: &WorldBox, axis: usize, rng: &mut SeededRng) -> WorldBox {
     let along = 1 - axis;
     let free = room.max[along] - room.min[along] - 2.0 * WALL - DOOR_WIDTH;
@@ -146,7 +146,7 @@ fn door_in(room: &WorldBox, axis: usize, rng: &mut SeededRng) -> WorldBox {
     WorldBox::new(low, high)
 }
 
-/// The low wall across `axis`: whole, or two pieces and a lintel round a door.
+/// The low wall across `axis`: whole, or two pieces and a lintel around a door.
 fn push_wall(boxes: &mut Vec<WorldBox>, room: &WorldBox, axis: usize, door: Option<&WorldBox>) {
     let along = 1 - axis;
     let mut wall = *room;
@@ -194,8 +194,8 @@ mod tests {
             |b: &Aabb| f64::from(b.extent().x) * f64::from(b.extent().y) * f64::from(b.extent().z);
         let filled: f64 = tiling.boxes.iter().map(volume).sum();
         assert_eq!(filled, volume(&block), "no gap and no overlap");
-        // Reachability: a portal lies on both of its rooms, and from room 0
-        // every room can be reached.
+        // Reachability: a portal touches both of its rooms, and every room can be reached from room
+        // 0.
         let mut reached = vec![false; tiling.boxes.len()];
         reached[0] = true;
         for _ in 0..tiling.boxes.len() {

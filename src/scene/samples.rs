@@ -17,7 +17,7 @@ pub struct Sample {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
-    /// SPDX identifier, and whom to name; the texts are in [`NOTICE`].
+    /// SPDX identifier and attribution; the texts are in [`NOTICE`].
     pub licence: &'static str,
     /// Unit of coordinates.
     pub unit: &'static str,
@@ -35,7 +35,7 @@ pub const NOTICE: &str = concat!(
     include_str!("../../datasets/freedm_LICENSE.txt")
 );
 
-/// All of them, in the order of the quick suite.
+/// All samples, in the order of the quick suite.
 pub static SAMPLES: &[Sample] = rows! { Sample { name, licence, unit, summary, file, bytes }
     "freedm-map12", "BSD-3-Clause", "map units",
         "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions",
@@ -58,21 +58,21 @@ impl Sample {
     }
 }
 
-/// Folder of the fetched files, from the working directory.
+/// Folder of the fetched files, relative to the working directory.
 pub const FETCHED_FOLDER: &str = "datasets/fetched";
 
-/// A file with real scenes that is fetched and not part of the program.
+/// A file with real scenes that is fetched and not compiled in.
 #[derive(Deserialize)]
 pub struct Fetched {
     /// Name for `scripts/fetch.py`.
     pub name: String,
     /// File in the folder of fetched files.
     file: String,
-    /// Digest of that file.
+    /// SHA-256 of that file.
     file_sha256: String,
-    /// SPDX identifier, and whom to name.
+    /// SPDX identifier and attribution.
     pub licence: String,
-    /// Scenes in the file for the suite `real`; perhaps none.
+    /// Scenes in the file for the suite `real`; may be empty.
     ///
     /// `.` is the file itself, `#MAP01` a map in it.
     scenes: String,
@@ -80,20 +80,20 @@ pub struct Fetched {
     pub summary: String,
 }
 
-/// All of them, in the order of the table.
+/// All fetched files, in the order of the table.
 pub static FETCHED: LazyLock<Vec<Fetched>> = LazyLock::new(|| {
     let mut table = csv::Reader::from_reader(&include_bytes!("../../datasets/fetch.csv")[..]);
-    // A test reads the table.
+    // A test checks that the table can be read.
     table.deserialize().flatten().collect()
 });
 
 impl Fetched {
-    /// File from the working directory.
+    /// Path from the working directory.
     pub fn path(&self) -> PathBuf {
         Path::new(FETCHED_FOLDER).join(&self.file)
     }
 
-    /// Tests whether the file has been fetched, and is the published one or made of it.
+    /// Tests whether the file is present and is the published one or derived from it.
     pub fn is_there(&self) -> bool {
         let is_it = |bytes: Vec<u8>| hex(&hmac_sha256::Hash::hash(&bytes)) == self.file_sha256;
         fs::read(self.path()).is_ok_and(is_it)

@@ -1,7 +1,7 @@
 //! From a typed scene to its data.
 //!
-//! A built-in sample, a generated family with parameters, or a file by its contents.
-//! Formats that are recognised and not read are refused with what to do instead.
+//! A built-in sample, a generated family with parameters, or a file by its contents. Known formats
+//! that are not read are refused with a suggestion.
 
 use std::fs;
 use std::path::Path;
@@ -21,12 +21,12 @@ use crate::input::{InputError, Result, is_readable, note, note_counted, read_fil
 use crate::shown::{plain, shortened};
 use crate::spec::{Spec, SpecError, nearest};
 
-/// First part of the name of every mesh.
+/// Prefix of the name of every mesh.
 const MESH_PREFIX: &str = "mesh:";
 
 /// The file and the name within it of `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`.
 ///
-/// An existing file wins.
+/// An existing file takes precedence.
 pub fn split_part(source: &str) -> (&str, Option<&str>) {
     let cuts = source.match_indices('#').rev();
     let mut parts = cuts.map(|(at, _)| (&source[..at], Some(&source[at + 1..])));
@@ -38,10 +38,9 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
     found.unwrap_or((source, None))
 }
 
-/// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; of others the source.
+/// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; else the source itself.
 ///
-/// # Errors
-/// A file that cannot be read, or a directory that is damaged.
+/// # Errors A file that cannot be read, or a damaged directory.
 pub fn every_part(source: &str) -> Result<Vec<String>> {
     let (file, part) = split_part(source);
     let names = match part {
@@ -54,17 +53,16 @@ pub fn every_part(source: &str) -> Result<Vec<String>> {
     })
 }
 
-/// Tells a zip archive by its beginning, or with bytes in front by its name.
+/// Recognises a zip archive by its magic, or by its name if bytes precede that.
 fn is_archive(bytes: &[u8], file: &str) -> bool {
     let has_name = [".zip", ".pk3"].map(|end| file.to_ascii_lowercase().ends_with(end));
     let is_other = || is_wad(bytes) || is_ibsp(bytes) || is_gltf(bytes);
     is_zip(bytes) || has_name.contains(&true) && !is_other()
 }
 
-/// Names of the maps of a WAD or the scenes of a zip archive; none of others.
+/// Names of the maps of a WAD or the scenes of a zip archive; empty for others.
 ///
-/// # Errors
-/// A directory that is damaged.
+/// # Errors A damaged directory.
 pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     match (is_wad(bytes), is_archive(bytes, file)) {
         (true, _) => map_names(bytes, file),
@@ -76,10 +74,9 @@ pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 /// Loads a scene: a sample, a spec or a file.
 ///
 /// `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`, `map.wad`,
-/// `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file wins over a name.
+/// `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file takes precedence over a name.
 ///
-/// # Errors
-/// One line that names what was found and what was expected.
+/// # Errors One line that names what was found and what was expected.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     let mut scene = read(source, options)?;
     if options.items == ItemKind::Triangles {
@@ -100,7 +97,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
         let what = format_args!("{own} is up by its format; --up {up} is for boxes CSV and OBJ");
         note(&format!("{name}: {what}"));
     }
-    // Formats that state an axis state a unit as well.
+    // Formats that define an axis define a unit as well.
     if options.up.is_none() && scene.unit.is_none() {
         let WorldBox { min, max } = scene.world_bounds();
         let along = |axis: UpAxis| (max - min).dot(axis.vector());
@@ -151,12 +148,11 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
     Err(error.into())
 }
 
-/// Refuses a scene whose name says that it will not fit into memory.
+/// Refuses a scene whose name shows that it will not fit into memory.
 ///
 /// Nothing is loaded.
 ///
-/// # Errors
-/// A scene that would not fit.
+/// # Errors A scene that would not fit.
 pub fn check_fits(source: &str, options: &LoadOptions) -> Result<()> {
     let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
         return Ok(());
@@ -168,7 +164,7 @@ pub fn check_fits(source: &str, options: &LoadOptions) -> Result<()> {
 impl Family {
     /// Refuses a scene that would not fit.
     ///
-    /// The generator reports a count that is no number.
+    /// The generator reports an invalid count.
     fn check_fits(&self, source: &str, spec: &Spec, options: &LoadOptions) -> Result<()> {
         let Ok(n) = spec.clone().whole("n", COUNT, 0..=MOST) else {
             return Ok(());
@@ -180,12 +176,11 @@ impl Family {
     }
 }
 
-/// Reads a file by its beginning or extension; anything else as boxes CSV.
+/// Reads a file by its first bytes or extension; anything else as boxes CSV.
 ///
-/// `name` will be the scene's.
+/// `name` becomes the scene's name.
 ///
-/// # Errors
-/// The errors of [`load`].
+/// # Errors The errors of [`load`].
 pub fn read_bytes(
     bytes: &[u8],
     names: [&str; 2],
@@ -205,7 +200,7 @@ fn read_beside(
     refuse(bytes, file)?;
     if is_archive(bytes, file) {
         let archive = zip::open(bytes, file)?;
-        // Read once: a glTF may have a buffer in each of thousands of entries.
+        // Listed once: a glTF may have a buffer in each of thousands of entries.
         let entries = zip::entries(&archive, file)?;
         let named = zip::finder(&entries);
         let (entry, record, map) = zip::chosen(&entries, &named, file, map)?;
@@ -274,10 +269,9 @@ pub fn is_wad(bytes: &[u8]) -> bool {
 }
 
 impl Sample {
-    /// The scene in it.
+    /// Loads the scene of the sample.
     ///
-    /// # Errors
-    /// The file cannot be read; no sample of this build has that error.
+    /// # Errors The file cannot be read; no sample of this build has that error.
     pub fn load(&self) -> Result<Scene> {
         let names = [self.file, self.name];
         Ok(Scene {
@@ -294,7 +288,7 @@ const PACKED: &str = "the file that is packed in it";
 const OWN_MAP: &str = "the BSP map that it belongs to";
 const READ: &str = "boxes CSV, glTF, OBJ, a Doom WAD or a Quake III map";
 
-/// Name (none: its extension), beginnings, extensions in capitals, and what to do.
+/// Name (empty: the extension), first bytes, extensions in capitals, suggestion.
 const FORMATS: [(&str, &[&[u8]], &str, &str); 22] = [
     ("", &[], "3DS 3MF ASE B3D DXF LWO OFF STL", MESH),
     ("", &[], "TSCN UASSET UNITY USDZ VOX WRL X", MESH),
@@ -320,10 +314,9 @@ const FORMATS: [(&str, &[&[u8]], &str, &str); 22] = [
     ("bzip2 or 7z", &[b"BZh", b"7z\xbc\xaf"], "BZ2 7Z", PACKED),
 ];
 
-/// Refuses formats that are known not to be read.
+/// Refuses known formats that are not read.
 ///
-/// # Errors
-/// The name of the format, and what to give instead.
+/// # Errors The name of the format, and what to give instead.
 pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let extension = Path::new(file).extension().unwrap_or_default();
     let extension = extension.to_string_lossy().to_ascii_uppercase();
@@ -331,14 +324,14 @@ pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let begins = |row: &&(_, &[&[u8]], _, _)| row.1.iter().any(|start| text.starts_with(start));
     let by_start = FORMATS.iter().find(begins);
-    // A download may have been unpacked under its name.
+    // The file may be a download unpacked under its old name.
     let is_named = |row: &&(_, _, &str, _)| row.2.split(' ').any(|name| name == extension);
     let mut named = FORMATS.iter().filter(is_named);
     let by_name = named.find(|row| row.3 != PACKED || begins(row));
     let stl = || bytes.starts_with(b"solid ") && holds(b"facet") || is_binary_stl(bytes);
     let first = text.trim_ascii_start().first();
     let is_xml = first == Some(&b'<');
-    // A first value that is sound as far as it goes.
+    // A first value that is valid up to its end.
     let mut values = serde_json::Deserializer::from_slice(text).into_iter::<IgnoredAny>();
     let is_json = matches!(first, Some(b'{' | b'[')) && extension != "GLTF";
     let is_json = is_json && values.any(|value| value.err().is_none_or(|error| error.is_eof()));
@@ -357,7 +350,7 @@ pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     Err(InputError::byte(file, 0, found, expected))
 }
 
-/// Tells binary STL by its size: 80 bytes, a count, 50 bytes for each triangle.
+/// Recognises binary STL by its size: 80 bytes, a count, 50 bytes per triangle.
 fn is_binary_stl(bytes: &[u8]) -> bool {
     let count = bytes.get(80..84).and_then(|count| count.try_into().ok());
     count.is_some_and(|count| {

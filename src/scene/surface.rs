@@ -1,6 +1,6 @@
-//! Surfaces beside boxes: the triangles of the items, their kinds and sides.
+//! Surfaces in addition to boxes: the triangles of items, their kinds and sides.
 //!
-//! It defines the form and its checks; where triangles come from is in `meshes`.
+//! Defines the form and its checks; generated triangles are in `meshes`.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -19,46 +19,45 @@ named! {
     pub enum SurfaceKind {
         /// A ray ends there.
         Opaque = "opaque",
-        /// A ray ends there or passes, as a mask of holes says: leaves, fences.
+        /// A ray ends there or passes, decided by a mask of holes: leaves, fences.
         ///
-        /// Such a surface is counted on to hide nothing.
+        /// Assumed to hide nothing.
         CutOut = "cut-out",
-        /// A ray passes, changed: glass, water.
+        /// A ray passes, altered: glass, water.
         ///
-        /// Such a surface hides nothing.
+        /// Assumed to hide nothing.
         Clear = "clear",
     }
 }
 
 /// Triangles, item by item.
 ///
-/// Coordinates are f32 about an f64 origin; corners are counter-clockwise as seen from the
+/// Coordinates are f32 relative to an f64 origin; corners are counter-clockwise as seen from the
 /// outside.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
-    /// Zero of `points`, in the world.
+    /// Origin of `points`, in world coordinates.
     pub origin: DVec3,
-    /// Corners, scene-local. No two items share one.
+    /// Corners, scene-local. No two items share a point.
     pub points: Vec<Vec3>,
     /// Three indices into `points` each.
     pub triangles: Vec<[u32; 3]>,
-    /// The triangles of each item: one range follows the other, without gaps.
+    /// The triangles of each item: consecutive ranges without gaps.
     pub of_item: Vec<Range<u32>>,
     /// Kind of each triangle.
     pub kinds: Vec<SurfaceKind>,
     /// `true` for each triangle that is seen from both sides.
     pub two_sided: Vec<bool>,
-    /// The points as a file states them, in the world; empty where `points` are exact.
+    /// The points as written, in world coordinates; empty if `points` are exact.
     written: Vec<DVec3>,
 }
 
-/// The six faces of a box, two triangles each: corners as [`Aabb::corner`] numbers
-/// them.
+/// The six faces of a box, two triangles each, by the corners of [`Aabb::corner`].
 pub(super) const BOX: [[u32; 3]; 12] = {
     let mut triangles = [[0; 3]; 12];
     let mut axis = 0;
     while axis < 3 {
-        // (axis, u, v) is right-handed, so u then v turns to the left about +axis.
+        // (axis, u, v) is right-handed, so u then v is counter-clockwise about +axis.
         let (k, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
         triangles[4 * axis] = [k, k | u, k | u | v];
         triangles[4 * axis + 1] = [k, k | u | v, k | v];
@@ -70,7 +69,7 @@ pub(super) const BOX: [[u32; 3]; 12] = {
 };
 
 impl Surfaces {
-    /// No item yet.
+    /// No items yet.
     pub fn about(origin: DVec3) -> Surfaces {
         Surfaces {
             origin,
@@ -78,10 +77,10 @@ impl Surfaces {
         }
     }
 
-    /// Boxes as they are written, each as twelve triangles, opaque and one-sided. O(n).
+    /// Boxes as written, each as twelve opaque one-sided triangles. O(n).
     ///
-    /// They are rounded outward about an origin, and as flat as they are. No face comes to
-    /// lie on the other side of the origin.
+    /// Rounded outward relative to an origin, and as flat as written. No face moves to the other
+    /// side of the origin.
     pub fn of_boxes_about<'b>(
         origin: DVec3,
         boxes: impl Iterator<Item = &'b WorldBox>,
@@ -99,11 +98,10 @@ impl Surfaces {
 
     /// The opaque triangles of an item, as the only item.
     ///
-    /// Only the one-sided of them where all of them are not closed. Points of one place are one
-    /// point: files have several, one for each normal.
+    /// Only the one-sided ones if all together are not closed. Points at one position are merged:
+    /// files have several, one for each normal.
     ///
-    /// # Panics
-    /// If there is no such item.
+    /// # Panics If there is no such item.
     pub fn solid_part(&self, item: usize) -> Surfaces {
         let opaque = self.range(item);
         let opaque = opaque.filter(|&at| self.kinds[at] == SurfaceKind::Opaque);
@@ -115,7 +113,7 @@ impl Surfaces {
                 .filter(|&&at| sides.contains(&self.two_sided[at]));
             let triangles = own.map(|&at| {
                 self.corners(at as u32).map(|p| {
-                    // No negative zero.
+                    // Adding 0.0 removes negative zeros.
                     *places
                         .entry((p + 0.0).to_array().map(f32::to_bits))
                         .or_insert_with(|| {
@@ -176,9 +174,9 @@ impl Surfaces {
         self.two_sided[first..].copy_from_slice(two_sided);
     }
 
-    /// Appends an opaque item by its points in the world.
+    /// Appends an opaque item by its points in world coordinates.
     ///
-    /// All items of a surface or none.
+    /// For all items of a surface or for none.
     pub(super) fn push_written(&mut self, points: &[DVec3], triangles: &[[u32; 3]]) {
         let local = points.iter().map(|p| (p - self.origin).as_vec3());
         let local: Vec<Vec3> = local.collect();
@@ -204,7 +202,7 @@ impl Surfaces {
         self.of_item[item].clone().map(|t| self.corners(t))
     }
 
-    /// The triangles of an item, cut where kind or sides change.
+    /// The triangles of an item, split where kind or sides change.
     pub fn runs(&self, item: usize) -> impl Iterator<Item = Range<u32>> {
         let mut rest = self.of_item[item].clone();
         let fact = |t: u32| (self.kinds[t as usize], self.two_sided[t as usize]);
@@ -226,7 +224,7 @@ impl Surfaces {
         Aabb::of_points(self.of(item).flatten())
     }
 
-    /// Smallest box in the world that holds triangles as they were written.
+    /// Smallest box in world coordinates that contains triangles as written.
     fn world_box(&self, triangles: &Range<u32>) -> WorldBox {
         let corners = self.triangles[triangles.start as usize..triangles.end as usize].iter();
         let corner = |&at: &u32| match self.written.get(at as usize) {
@@ -241,11 +239,9 @@ impl Surfaces {
 
     /// The scene of these triangles.
     ///
-    /// Its items are the smallest f32 boxes that hold those of each item, as they were
-    /// written.
+    /// Its items are the smallest f32 boxes that contain the triangles of each item as written.
     ///
-    /// # Errors
-    /// An item without triangles, which has no box.
+    /// # Errors An item without triangles, which has no box.
     pub fn into_scene(self, name: impl Into<String>) -> Result<Scene> {
         let boxes: Vec<_> = self.of_item.iter().map(|t| self.world_box(t)).collect();
         let scene = Scene::about(name, &boxes, self.origin)?;
@@ -257,8 +253,8 @@ impl Surfaces {
 
     /// Number of open edges of an item.
     ///
-    /// They are not gone along as often one way as the other: zero for closed surfaces whose
-    /// triangles are wound alike. Edges are told apart by their indices. O(t log t).
+    /// Open: not traversed equally often in both directions. Zero for closed, consistently wound
+    /// surfaces. Edges are identified by their indices. O(t log t).
     pub fn open_edges(&self, item: usize) -> usize {
         let triangles = self.triangles[self.range(item)].iter();
         let edges = triangles.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
@@ -290,10 +286,9 @@ impl Scene {
         }
     }
 
-    /// The same triangles, an item each, with the labels of their items.
+    /// The same triangles, one item each, with the labels of their items.
     ///
-    /// # Errors
-    /// A scene without triangles, or one that does not fit into memory.
+    /// # Errors A scene without triangles, or one that does not fit into memory.
     pub fn by_triangle(self, options: &LoadOptions) -> Result<Scene> {
         let Some(surfaces) = &self.surfaces else {
             return Err(SpecError::new(format_args!(
@@ -329,9 +324,9 @@ impl Scene {
     }
 }
 
-/// The points of triangles, each once, in the order in which they occur.
+/// The points of triangles, each once, in the order of occurrence.
 ///
-/// The triangles are then indices into them. `places` may be any that another call left.
+/// The triangles become indices into them. `places` may hold anything that another call left.
 pub(super) fn own_points(
     points: &[DVec3],
     triangles: &mut [[u32; 3]],
@@ -357,7 +352,7 @@ pub(super) fn own_points(
 
 /// Volume within a closed surface, cubic world units, rounded.
 ///
-/// Positive where it is wound outward.
+/// Positive if it is wound outward.
 pub fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
     let mut triangles = triangles.peekable();
     let Some(&[zero, ..]) = triangles.peek() else {
@@ -389,7 +384,7 @@ mod tests {
     use super::*;
 
     impl Surfaces {
-        /// Every item of a scene as the smallest f32 box that holds it.
+        /// The box surfaces of a scene's items, in their smallest f32 boxes.
         pub fn from_boxes(scene: &Scene) -> Surfaces {
             let mut all = Surfaces::about(scene.origin);
             let push = |b| all.push_box(SurfaceKind::Opaque, false, b);
@@ -397,7 +392,7 @@ mod tests {
             all
         }
 
-        /// Volume of an item, as [`volume_within`] its surface.
+        /// Volume of an item, from [`volume_within`] its surface.
         pub fn volume(&self, item: usize) -> f64 {
             volume_within(self.of(item))
         }
@@ -415,11 +410,11 @@ mod tests {
         }
     }
 
-    /// A cube of exporters: corners once per face, and a triangle without area.
+    /// A cube as exporters write it: corners per face, and a degenerate triangle.
     #[test]
     fn a_body_of_several_points_per_place_is_closed() {
         let unit = Aabb::new(Vec3::ZERO, Vec3::ONE);
-        // Zero and negative zero are one place.
+        // Zero and negative zero are one position.
         let sign = [Vec3::ONE, Vec3::NEG_ONE];
         let split = BOX.as_flattened().iter().zip(sign.iter().cycle());
         let split = split.map(|(&i, sign)| {
@@ -439,7 +434,7 @@ mod tests {
             ),
             (0, 8)
         );
-        // Open ones from both sides are none.
+        // Two-sided open triangles do not count.
         assert!(surfaces.solid_part(1).triangles.is_empty());
     }
 
@@ -454,7 +449,7 @@ mod tests {
             let volume = size.x * size.y * size.z;
             assert!((surfaces.volume(item) - volume).abs() <= 1e-9 * volume);
             assert_eq!(surfaces.bounds(item), *b);
-            // Every triangle for itself: the centre is behind it.
+            // For every triangle the centre is behind it.
             for [p, q, r] in surfaces.of(item).map(|c| c.map(Vec3::as_dvec3)) {
                 let normal = (q - p).cross(r - p);
                 assert!(normal.dot(b.centre().as_dvec3() - p) < 0.0);
@@ -490,7 +485,7 @@ mod tests {
         ] {
             let scene = load(source, &Default::default()).unwrap();
             assert_eq!(scene.item_shape(), shape, "{source}");
-            // A boxes file holds boxes.
+            // A boxes file contains boxes.
             let settled = scene.settled().unwrap();
             assert_eq!(settled.item_shape(), ItemShape::Box, "{source}");
         }

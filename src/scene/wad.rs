@@ -15,7 +15,7 @@ use crate::input::Result;
 
 /// Height of a player's eyes above the floor, in map units.
 const EYE_HEIGHT: f64 = 41.0;
-/// Least and greatest map coordinate: they have 16 bits.
+/// Least and greatest map coordinate: 16 bits.
 const EXTENT: [f64; 2] = [i16::MIN as f64, i16::MAX as f64];
 
 /// One map of a WAD file, decoded and cross-checked.
@@ -23,7 +23,7 @@ const EXTENT: [f64; 2] = [i16::MIN as f64, i16::MAX as f64];
 pub struct WadMap {
     /// Things of the map in the order of the file.
     pub things: Vec<Thing>,
-    /// Its linedefs, in the order of the file; each has a side.
+    /// Its linedefs, in the order of the file; each has at least one side.
     pub lines: Vec<Linedef>,
     /// Its sectors, in the order of the file.
     pub sectors: Vec<SectorRecord>,
@@ -36,7 +36,7 @@ pub struct WadMap {
     disputes: OnceLock<Vec<Dispute>>,
 }
 
-/// A sector as the file has it.
+/// A sector as in the file.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SectorRecord {
     /// Heights of its floor and its ceiling, which may lie below the floor.
@@ -65,8 +65,7 @@ pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 impl WadMap {
     /// Decodes one map: the named one, or the only one.
     ///
-    /// # Errors
-    /// The first thing that is wrong, by its byte.
+    /// # Errors The first error in the file, by its byte.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap> {
         let wad = Wad::open(bytes, file)?;
         let [things, linedefs, sides, vertices, rest @ ..] = wad.tables(map)?;
@@ -154,7 +153,7 @@ impl WadMap {
         })
     }
 
-    /// Places about which the linedefs disagree: the sectors are then no regions.
+    /// Points for which the linedefs disagree; with any, sectors are not regions.
     pub fn disputes(&self) -> &[Dispute] {
         self.disputes.get_or_init(|| disputes(&self.lines))
     }
@@ -177,7 +176,7 @@ impl WadMap {
         boxes.iter().for_each(|_| kinds.push("linedef"));
         let mut places = Vec::with_capacity(self.things.len());
         for thing in &self.things {
-            // Things are 16-bit, so the descent always ends in a leaf.
+            // Coordinates of things have 16 bits, so the descent always ends in a leaf.
             let leaf = self.tree.descend(thing.at);
             let sector = leaf.map(|leaf| self.leaf_sectors[leaf as usize] as usize);
             let floor = sector.map_or(0.0, |sector| self.sectors[sector].heights[0]);
@@ -196,7 +195,7 @@ impl WadMap {
                 view: None,
             });
         }
-        // Map coordinates are small integers, exact in f32: no other origin.
+        // Map coordinates are small integers, exact in f32: the origin is zero.
         let scene = Scene::about(name, &boxes, DVec3::ZERO)?;
         Ok(Scene {
             own_tree: Some(self.tree.plane_tree()),
@@ -213,7 +212,7 @@ mod tests {
     use super::*;
 
     impl WadMap {
-        /// Sectors at rest between lines, all of them in one leaf.
+        /// Static sectors between lines, all of them in one leaf.
         pub fn at_rest(lines: Vec<Linedef>, heights: Vec<[f64; 2]>) -> WadMap {
             let sectors = heights.into_iter();
             WadMap {

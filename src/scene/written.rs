@@ -1,6 +1,6 @@
-//! Boxes and points as they were written, in f64, beside the f32 of indexes.
+//! Boxes and points as written, in f64, in addition to the f32 of indexes.
 //!
-//! Region search is made exact by them: the exact test of the candidates of an index.
+//! They make region search exact: an index's candidates are tested exactly.
 
 use std::sync::Arc;
 
@@ -12,23 +12,23 @@ use crate::geometry::{Aabb, ConvexVolume};
 use crate::input::Result;
 use crate::query::ItemId;
 
-/// The boxes as written, kept only where f32 holds one of them otherwise.
+/// The boxes as written, kept only if f32 changes one of them.
 ///
-/// One of NaN is as its item is stored, such as an item that a generated motion moves.
+/// A NaN box stands for the stored one, as for an item that a generated motion moves.
 #[derive(Clone, Default, Debug)]
 pub struct Originals {
     boxes: Arc<[WorldBox]>,
 }
 
 impl Originals {
-    /// `stored` are the same boxes as indexes have them, about `origin`.
+    /// Keeps `written` if `stored`, the same boxes about `origin`, differs.
     pub(super) fn of(written: &[WorldBox], stored: &[Aabb], origin: DVec3) -> Originals {
         let mut both = written.iter().zip(stored);
         let exact = both.all(|(written, stored)| written.is_stored_as(stored, origin));
         Originals::listed(if exact { &[] } else { written })
     }
 
-    /// The boxes by id; none where all are as they are stored.
+    /// The boxes by id; none if all equal the stored ones.
     pub(crate) fn listed(boxes: &[WorldBox]) -> Originals {
         let all_stored = boxes.iter().all(|b| b.min.is_nan());
         Originals {
@@ -36,27 +36,27 @@ impl Originals {
         }
     }
 
-    /// The box of an item where it is known apart from the stored one.
+    /// The box of an item if it differs from the stored one.
     pub fn of_item(&self, id: usize) -> Option<&WorldBox> {
         self.boxes.get(id).filter(|b| !b.min.is_nan())
     }
 
-    /// The boxes, or as many that are as they are stored.
+    /// The boxes; `count` NaN boxes if none are kept.
     pub(crate) fn or_stored(&self, count: usize) -> Vec<WorldBox> {
         let all_stored = || vec![WorldBox::AS_STORED; count];
         self.boxes().map_or_else(all_stored, <[_]>::to_vec)
     }
 
-    /// In world coordinates; `None` if the stored boxes are the very same.
+    /// The boxes in world coordinates; `None` if they equal the stored ones.
     pub fn boxes(&self) -> Option<&[WorldBox]> {
         (!self.boxes.is_empty()).then_some(&self.boxes)
     }
 }
 
-/// A point to search for: as it was written, and as indexes take it.
+/// A point to search for: as written, and rounded for indexes.
 ///
-/// Rounding to nearest loses no box: a bound is an f32 number, and a coordinate
-/// beyond it is rounded beyond it or onto it. It can only add candidates.
+/// Rounding to nearest loses no box: a bound is an f32 number, and a coordinate beyond it is
+/// rounded beyond it or onto it. It can only add candidates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sought {
     /// World coordinates, in f64.
@@ -65,19 +65,19 @@ pub struct Sought {
     pub local: Vec3,
 }
 
-/// A box to search by: as it was written, and as indexes take it.
+/// A box to search by: as written, and rounded for indexes.
 #[derive(Clone, Debug)]
 pub struct SoughtBox {
     /// World coordinates, in f64.
     pub world: WorldBox,
-    /// The planes of the smallest f32 box that holds it.
+    /// The planes of the smallest f32 box that contains it.
     ///
-    /// They admit too many items rather than too few.
+    /// They may admit too many items, never too few.
     pub volume: ConvexVolume,
 }
 
 impl Scene {
-    /// A point of the world as this scene's indexes take it.
+    /// A world point in the form that this scene's indexes take.
     ///
     /// A planar BSP ignores the height.
     #[inline]
@@ -89,16 +89,16 @@ impl Scene {
         Sought { world, local }
     }
 
-    /// A box of the world as this scene's indexes take it.
+    /// A world box in the form that this scene's indexes take.
     pub fn sought_box(&self, world: WorldBox) -> SoughtBox {
         let local = Aabb::rounded_outward(world.min, world.max, self.origin);
         let volume = ConvexVolume::of_box(&local);
         SoughtBox { world, volume }
     }
 
-    /// Region search: the regions that hold the point exactly.
+    /// Region search: the regions that contain the point exactly.
     ///
-    /// `ask` appends the candidates of an index; the others of them are dropped.
+    /// `ask` appends the candidates of an index; false candidates are dropped.
     #[inline]
     pub fn search(
         &self,
@@ -119,9 +119,9 @@ impl Scene {
             || (0..3).any(is_rounded)
     }
 
-    /// Keeps the regions that hold the point exactly.
+    /// Keeps the regions that contain the point exactly.
     ///
-    /// Drops the others of the candidates from `first` on.
+    /// Drops other candidates from index `first` on.
     #[inline]
     pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
         if found.len() > first && self.is_refined(p) {
@@ -136,16 +136,16 @@ impl Scene {
         }
     }
 
-    /// Keeps the items that overlap the box exactly, of an index's candidates.
+    /// Keeps the candidates of an index that overlap the box exactly.
     ///
-    /// Closed boxes that have a point in common.
+    /// Closed boxes with a common point.
     pub fn refine_overlapping(&self, sought: &SoughtBox, found: &mut Vec<ItemId>) {
         found.retain(|&id| self.overlaps(id, &sought.world));
     }
 
-    /// Reference answer of region search.
+    /// Reference answer of region search, ascending ids.
     ///
-    /// The map's own descent, or an exact test of every box. Ascending ids.
+    /// Computed by the map's own descent, or an exact test of every box.
     pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
         if let Some(leaf) = self.regions.leaf_at(p.world - self.origin) {
             return leaf.into_iter().collect();
@@ -154,19 +154,18 @@ impl Scene {
         (0..count).filter(|&id| self.holds(id, p.world)).collect()
     }
 
-    /// Tests whether a region that is a box holds a point of the world.
+    /// Tests whether a region that is a box contains a world point.
     fn holds(&self, id: ItemId, p: DVec3) -> bool {
         let boxes = self.regions.boxes(&self.items);
         self.meets(boxes, self.region_originals(), id, &WorldBox::at(p))
     }
 
-    /// Tests whether an item, as it was written, has a point in common with a box.
+    /// Tests whether an item, as written, has a point in common with a box.
     pub fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
         self.meets(&self.items, &self.originals, id, by)
     }
 
-    /// Tests whether a box of a list, as it was written, has a point in common with
-    /// another one.
+    /// Tests whether a listed box, as written, has a point in common with another.
     fn meets(&self, boxes: &[Aabb], originals: &Originals, id: ItemId, by: &WorldBox) -> bool {
         if let Some(written) = originals.boxes() {
             return written[id as usize].meets(by);
@@ -178,7 +177,7 @@ impl Scene {
         })
     }
 
-    /// The regions as they were written.
+    /// The regions as written.
     pub(crate) fn region_originals(&self) -> &Originals {
         match &self.regions {
             Regions::Tiling(tiling) => &tiling.originals,
@@ -186,14 +185,14 @@ impl Scene {
         }
     }
 
-    /// The items as they were written, world coordinates.
+    /// The items as written, in world coordinates.
     ///
-    /// Exact: where no original is kept, origin and stored box add up without rounding.
+    /// Exact: without a kept original, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
         (0..self.items.len()).map(|id| self.written_box(id))
     }
 
-    /// The same of one item.
+    /// An item as written, in world coordinates.
     pub fn written_box(&self, id: usize) -> WorldBox {
         match self.originals.boxes() {
             Some(boxes) => boxes[id],
@@ -203,16 +202,12 @@ impl Scene {
 
     /// The scene as it is read back from a boxes file.
     ///
-    /// The same boxes, as they were written, and labels; no triangles, regions, camera
-    /// places or own tree.
+    /// The same boxes, as written, and labels; no triangles, regions, camera places or own tree.
     ///
-    /// Almost always the stored items are the very same too. Where the reader
-    /// chooses another origin (a map whose zero lies far away), they are rounded
-    /// about that one.
+    /// Almost always the stored items are identical too. If the reader chooses another origin (a
+    /// map whose origin is far away), they are rounded relative to that.
     ///
-    /// # Errors
-    /// An item that lies beyond what the reader
-    /// takes: the range of f32, in world coordinates.
+    /// # Errors An item beyond the range of the reader: f32 in world coordinates.
     pub fn settled(self) -> Result<Scene> {
         let most = f64::from(f32::MAX);
         let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
@@ -236,14 +231,14 @@ impl Scene {
 fn side(p: f64, origin: f64, bound: f32) -> i32 {
     let (difference, lost) = two_sum(p, -origin);
     let bound = f64::from(bound);
-    // The rounded difference is on the true one's side of any double.
+    // The rounded difference and the exact one are on the same side of any double.
     if difference != bound {
         return if difference > bound { 1 } else { -1 };
     }
     i32::from(lost > 0.0) - i32::from(lost < 0.0)
 }
 
-/// `Vec::retain` of the ids from `first` on.
+/// `Vec::retain` for the ids from index `first` on.
 fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> bool) {
     ids.extract_if(first.., |id| !keep(*id)).for_each(drop);
 }
@@ -281,12 +276,12 @@ mod tests {
             let mut found = vec![0];
             scene.refine_overlapping(&sought, &mut found);
             let found = found.len();
-            // What the planes admit may be too much, never too little.
+            // The planes may admit too many items, never too few.
             assert!(scene.items.iter().filter(|b| sought.volume.sees(b)).count() >= found);
             found
         };
         assert_eq!(found(-1e300, 1e300), 1);
-        // Touching, from either side, and not quite.
+        // Touching, from either side, and just not touching.
         assert_eq!(found(1.0, 1e300), 1);
         assert_eq!(found(-1e300, 0.0), 1);
         assert_eq!(found(1.0f64.next_up(), 1e300), 0);
@@ -294,7 +289,7 @@ mod tests {
         assert_eq!(found(-1e300, -1e299), 0);
     }
 
-    /// A double as a whole number of 2^-1074.
+    /// A double as a multiple of 2^-1074.
     fn units(x: f64) -> IBig {
         let bits = x.abs().to_bits();
         let exponent = (bits >> 52) as usize;
@@ -336,12 +331,12 @@ mod tests {
         bytes
     }
 
-    /// Writes, reads and writes again; what was read.
+    /// Writes, reads and writes again; returns the scene read.
     fn there_and_back(scene: &Scene) -> Scene {
         let kept = scene.clone().settled().unwrap();
         let bytes = written(&kept);
         let read = read_boxes_csv(&bytes[..], "b.csv", false).unwrap();
-        // Zero may lose its sign on the way, and nothing else may change.
+        // Zero may lose its sign on the way; nothing else may change.
         assert_eq!((kept.origin, &kept.items), (read.origin, &read.items));
         assert_eq!(kept.bounds, read.bounds);
         assert_eq!(kept.originals.boxes(), read.originals.boxes());
@@ -369,7 +364,7 @@ mod tests {
             let scene = load(source, &LoadOptions::default()).unwrap();
             let read = there_and_back(&scene);
             let is_same = (scene.origin, &scene.items) == (read.origin, &read.items);
-            // A map's own zero is not what a reader chooses.
+            // A reader does not choose a map's own origin.
             assert!(is_same || source.starts_with("freedm"), "{source}");
         }
     }
@@ -377,13 +372,13 @@ mod tests {
     #[test]
     fn another_origin_is_taken_once() {
         let b = |low: f64, high: f64| WorldBox::new(DVec3::splat(low), DVec3::splat(high));
-        // A map's own zero, far away.
+        // A map's own origin, far away.
         let far = [b(1e7 + 0.1, 1e7 + 1.7), b(1e7 + 3.3, 1e7 + 3.3)];
         let map = Scene::about("map", &far, DVec3::ZERO).unwrap();
         let read = there_and_back(&map);
-        // Stored about the map's zero they were a step of f32 larger.
+        // Stored relative to the map's origin they were one f32 step larger.
         assert!(read.origin.x > 9e6 && read.world_bounds().min.x > map.world_bounds().min.x);
-        // Rounded outward, these are a power of two wide.
+        // Rounded outward, these have a width of a power of two.
         for shift in 0..64 {
             let low = 1e7 + 0.3 + 16.0 * f64::from(shift);
             let wide = [b(low, low + 1.0), b(low + 5.0, low + 1_023.999_99)];
@@ -400,8 +395,7 @@ mod tests {
     }
 
     proptest! {
-        /// Any boxes about any origin: what is read back are the very same, and
-        /// they are written the same.
+        /// Any boxes about any origin: read back and written again, they are identical.
         #[test]
         fn nothing_is_lost_and_the_second_time_is_the_first(
             centre in prop::num::f64::NORMAL.prop_map(|v| v % 1e12),

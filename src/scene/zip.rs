@@ -1,7 +1,7 @@
 //! Zip archives (zip, pk3), read in place: one entry is unpacked at a time.
 //!
-//! No size is believed before the bytes are there. Buffers of a glTF are entries beside it:
-//! `..` leads no farther than the archive. Source: PKWARE, APPNOTE.TXT 6.3.
+//! No size is trusted before the bytes are there. Buffers of a glTF are entries beside it: `..`
+//! does not leave the archive. Source: PKWARE, APPNOTE.TXT 6.3.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
@@ -13,19 +13,19 @@ use super::memory;
 use crate::input::{InputError, Result};
 use crate::shown::{counted, first_of, part_hint, plain, shortened};
 
-/// Endings of the names of scenes.
+/// Extensions of scenes.
 const SCENES: [&str; 6] = [".bsp", ".wad", ".gltf", ".glb", ".obj", ".csv"];
-/// Names in a message.
+/// Most names in a message.
 const MOST_NAMED: usize = 32;
-/// Memory that unpacking takes, in sizes of the entry: it grows by doubling.
+/// Peak memory of unpacking / size of the entry: the buffer grows by doubling.
 const GROWTH: u64 = 3;
 
-/// Tells an archive by the magic of its first entry, or of its end if it has none.
+/// Recognises an archive by the magic of its first entry, or of its end if empty.
 pub fn is_zip(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
 }
 
-/// Names of the entries of an archive that are scenes by their names, in its order.
+/// Names of the entries of an archive that are scenes by extension, in its order.
 pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     let archive = open(bytes, file)?;
     let entries = entries(&archive, file)?.into_iter();
@@ -33,11 +33,10 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     Ok(names.filter(|name| ends_in(name, &SCENES)).collect())
 }
 
-/// The bytes of an entry.
+/// The unpacked bytes of an entry.
 ///
-/// # Errors
-/// An entry that is encrypted, packed by another method, too large for the memory, or other
-/// bytes than the directory states.
+/// # Errors An encrypted entry, another compression method, too little memory, or bytes that differ
+/// from the directory.
 pub fn unpacked(
     archive: &Archive,
     file: &str,
@@ -79,7 +78,7 @@ pub fn unpacked(
     Ok(unpacked)
 }
 
-/// Finds entries: that of the very name, or the last one that differs by case.
+/// Finds entries: the exact name, or else the last one that differs only by case.
 pub fn finder<'e, 'r>(entries: &'e [Named<'r>]) -> impl Fn(&str) -> Option<&'e Named<'r>> {
     let keyed = |key: fn(&str) -> String| -> HashMap<String, &'e Named<'r>> {
         entries.iter().map(|entry| (key(&entry.0), entry)).collect()
@@ -105,7 +104,7 @@ fn damaged(file: &str, error: rawzip::Error) -> InputError {
 
 /// Names and records in the order of the directory, without folders.
 ///
-/// The last of several entries of one name counts.
+/// The last of several entries with one name counts.
 pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     let (mut all, mut records) = (Vec::new(), archive.entries());
     while let Some(record) = records.next_entry().map_err(|error| damaged(file, error))? {
@@ -124,7 +123,7 @@ pub fn entries<'a>(archive: &'a Archive, file: &str) -> Result<Vec<Named<'a>>> {
     Ok(all)
 }
 
-/// A name in code page 437, as names of zip archives are that are no UTF-8.
+/// A name in code page 437, the encoding of zip entries that are not UTF-8.
 fn of_code_page(name: &[u8]) -> String {
     const UPPER_HALF: &str = "ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜ¢£¥₧ƒáíóúñÑªº¿⌐¬½¼¡«»░▒▓│┤╡╢╖╕╣║╗╝╜╛┐\
                               └┴┬├─┼╞╟╚╔╩╦╠═╬╧╨╤╥╙╘╒╓╫╪┘┌█▄▌▐▀αßΓπΣσµτΦΘΩδ∞φε∩≡±≥≤⌠⌡÷≈°∙·√ⁿ²■\u{a0}";
@@ -136,9 +135,9 @@ fn of_code_page(name: &[u8]) -> String {
     name.iter().map(decoded).collect()
 }
 
-/// Tells by the name.
+/// Tests the extension of a name.
 ///
-/// macOS adds to each file of an archive a `._` file with its attributes.
+/// macOS adds to each file of an archive a `._` file with its attributes; these do not count.
 fn ends_in(name: &str, endings: &[&str]) -> bool {
     let name = name.to_ascii_lowercase();
     let is_aside = name.rsplit('/').next().unwrap_or("").starts_with("._");
@@ -149,8 +148,7 @@ fn ends_in(name: &str, endings: &[&str]) -> bool {
 ///
 /// Also the map in it, if one is named, as in `maps.wad#MAP07`.
 ///
-/// # Errors
-/// No such entry, or several.
+/// # Errors No such entry, or several.
 pub fn chosen<'e, 'r, 'w>(
     entries: &'e [Named<'r>],
     named: impl Fn(&str) -> Option<&'e Named<'r>>,
@@ -297,7 +295,7 @@ pub mod tests {
             "no scene among 1 entry",
         );
         refused(&packed(&[]), None, "no scene among no entries");
-        // The very name first, and the last of several entries of one name.
+        // The exact name first, and the last of several entries with one name.
         let two = [BOX, b"1,1,1,2,2,2\n"].concat();
         let cases = packed(&[("A.csv", BOX, 0), ("a.csv", &two, 0), ("b.csv", &two, 0)]);
         let counts = ["A.csv", "a.csv", "B.csv"].map(|part| read(&cases, Some(part)));
@@ -310,7 +308,7 @@ pub mod tests {
             ("a.csv", BOX, 8),
         ]);
         assert_eq!(read(&mac, None), Ok(1));
-        // Archives in archives.
+        // Nested archives.
         let outer = packed(&[("inner.pk3", &one, 8)]);
         let outermost = packed(&[("o.zip", &outer, 0), ("w.zip", &wad, 0)]);
         for part in ["inner.pk3", "inner.pk3#in/one.csv"] {
@@ -318,7 +316,7 @@ pub mod tests {
         }
         assert_eq!(read(&outermost, Some("o.zip#inner.pk3#in/one.csv")), Ok(1));
         assert_eq!(read(&outermost, Some("w.zip#maps/d.wad#map12")), alone);
-        // They are not opened without their name: an archive may hold itself.
+        // Not opened without their name: an archive may contain itself.
         refused(
             &outermost,
             None,
@@ -383,7 +381,7 @@ pub mod tests {
         );
         refused(&with(0, b"XK"), None, "directory");
         refused(&good[..good.len() - 9], None, "directory");
-        // A name that steers a terminal.
+        // A name with terminal escape sequences.
         let odd = packed(&[("\x1b[31m\n.csv", b"", 0)]);
         let error = read(&odd, None).unwrap_err();
         assert!(!error.contains(char::is_control), "{error:?}");

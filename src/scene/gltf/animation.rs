@@ -1,7 +1,7 @@
 //! Cameras of a glTF file: lenses, and the animation that moves one.
 //!
-//! Between keys, translations and scales are interpolated linearly and rotations along the
-//! arc; cubic splines by Hermite's polynomials.
+//! Between keys, translations and scales are interpolated linearly and rotations along the arc;
+//! cubic splines by Hermite's polynomials.
 
 use std::array;
 use std::collections::{BTreeSet, HashMap};
@@ -22,19 +22,19 @@ use crate::shown::counted;
 /// The animated camera of a file.
 #[derive(Clone, Debug)]
 pub struct CameraAnimation {
-    /// From the root to the camera.
+    /// Transforms from the root to the camera.
     chain: Vec<Motion>,
     lens: Option<PlaceView>,
     /// Seconds of the first and of the last key.
     pub seconds: [f64; 2],
-    /// Number of cameras that an animation moves.
+    /// Number of cameras that animations move.
     pub cameras: usize,
     /// Number of animations that move this one.
     pub clips: usize,
 }
 
 impl CameraAnimation {
-    /// The camera at a time in seconds; `None` where its transform has no direction.
+    /// The camera at a time in seconds; `None` if its transform has no direction.
     pub fn at(&self, time: f64) -> Option<CameraPlace> {
         let own = self.chain.iter().map(|motion| motion.at(time));
         let world = own.fold(DAffine3::IDENTITY, |above, own| above * own);
@@ -42,7 +42,7 @@ impl CameraAnimation {
     }
 }
 
-/// Translation, rotation and scale, where they are stated.
+/// Translation, rotation and scale; `None` if not stated.
 pub type Parts = [Option<DVec4>; 3];
 
 /// Transform of a node over time.
@@ -53,16 +53,16 @@ struct Motion {
     tracks: [Option<Arc<Track>>; 3],
 }
 
-/// Animation, place in it, part that is moved, and the channel itself.
+/// Animation, index in it, animated part, and the channel itself.
 type Moving<'f> = (usize, usize, usize, &'f Channel);
 
-/// Tracks by input, output, width and interpolation; many channels may name one.
+/// Tracks by input, output, width and interpolation; channels may share one.
 type Tracks = HashMap<[usize; 4], Arc<Track>>;
 
 #[derive(Clone, Debug)]
 struct Track {
     times: Vec<f64>,
-    /// One for each time; of a cubic spline three: a value between its tangents.
+    /// One per time; three for a cubic spline: a value between its tangents.
     values: Vec<DVec4>,
     interpolation: Interpolation,
 }
@@ -119,7 +119,7 @@ pub fn place_of(world: DAffine3, lens: Option<PlaceView>) -> Option<CameraPlace>
     })
 }
 
-/// An affine transform of its parts.
+/// The affine transform of its parts.
 pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(
         scaled.map_or(DVec3::ONE, DVec4::truncate),
@@ -128,11 +128,11 @@ pub fn transform([moved, turned, scaled]: Parts) -> DAffine3 {
     )
 }
 
-/// The lens of a camera; its up vector is of no meaning.
+/// The lens of a camera; its up vector is meaningless.
 fn lens(camera: &Value) -> Option<PlaceView> {
     let lens = &camera[camera["type"].as_str()?];
     let number = |name: &str| lens[name].as_f64();
-    // A sign mirrors the view: the volume is the same.
+    // A negative sign mirrors the view: the volume is the same.
     let half = |name: &str| number(name).map(f64::abs);
     let aspect = || Some(half("xmag")? / half("ymag")?);
     Some(PlaceView {
@@ -247,7 +247,7 @@ impl File<'_> {
     }
 }
 
-/// Part of a transform that a channel moves; `None` for another property.
+/// Part of a transform that a channel animates; `None` for another property.
 pub fn part(channel: &Channel) -> Option<usize> {
     match channel.target.path {
         Checked::Valid(Property::Translation) => Some(0),

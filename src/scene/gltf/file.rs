@@ -1,4 +1,4 @@
-//! A glTF file with its buffers: what its indices and accessors refer to.
+//! A glTF file with its buffers, and access by its indices and accessors.
 //!
 //! Chunks of a GLB are read here: the reader of the crate gltf panics on a short one.
 
@@ -21,10 +21,10 @@ use crate::input::{InputError, Result, read_file};
 use crate::scene::memory;
 use crate::shown::{message, plain, shortened};
 
-/// Bytes of a node, the most common object, as it is parsed.
+/// Bytes of a parsed node, the most common object.
 const BYTES_PER_OBJECT: u64 = (size_of::<Node>() + size_of::<ExactNode>()) as u64;
 
-/// JSON and binary chunk of a GLB of version 2; `None` if they are cut off.
+/// JSON and binary chunk of a GLB of version 2; `None` if truncated.
 fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize);
     let bytes = bytes.get(..number(8)?)?;
@@ -44,7 +44,7 @@ fn glb(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
     Some((json, None))
 }
 
-/// Reads what glTF 2.0 allows and the typed form refuses.
+/// Parses JSON that glTF 2.0 allows and the typed form refuses.
 ///
 /// Channels without a node, scenes without nodes, numbers beyond f32.
 fn lenient(mut json: Value) -> Option<Root> {
@@ -61,7 +61,7 @@ fn lenient(mut json: Value) -> Option<Root> {
     serde_json::from_value(json).ok()
 }
 
-/// Nodes and cameras as the file states them: the typed form rounds numbers to f32.
+/// Nodes and cameras as stated in the file: the typed form rounds numbers to f32.
 #[derive(Default, Deserialize)]
 pub struct Exact {
     #[serde(default)]
@@ -79,13 +79,13 @@ pub struct ExactNode {
     pub scale: Option<DVec3>,
 }
 
-/// Reads a file that a scene names relative to itself.
+/// Reads a file whose name is relative to the scene.
 pub type Beside<'b> = &'b dyn Fn(&str) -> Result<Vec<u8>>;
 
-/// The file in the folder of a scene.
+/// Reads a file in the folder of a scene.
 pub fn beside(file: &str, name: &str) -> Result<Vec<u8>> {
     let folder = Path::new(file).parent().unwrap_or(Path::new(""));
-    // `-` alone is standard input.
+    // `-` alone would be standard input.
     let path = folder.join(if name == "-" { "./-" } else { name });
     match path.is_file() || !path.exists() {
         true => Ok(read_file(&path)?.to_vec()),
@@ -93,7 +93,7 @@ pub fn beside(file: &str, name: &str) -> Result<Vec<u8>> {
     }
 }
 
-/// A URI without percent-encoding.
+/// Decodes percent-encoding of a URI.
 fn decoded(uri: &str) -> String {
     let mut parts = uri.split('%');
     let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();
@@ -107,7 +107,7 @@ fn decoded(uri: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Some of the bytes, by the first and their number.
+/// A part of the bytes, by its offset and length.
 fn part(bytes: &[u8], first: u64, length: u64) -> Option<&[u8]> {
     let end = usize::try_from(first.checked_add(length)?).ok()?;
     bytes.get(first as usize..end)
@@ -137,14 +137,14 @@ impl<'f> File<'f> {
             false => (bytes, None),
         };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        // Some exporters pad with zero bytes in the place of spaces.
+        // Some exporters pad with zero bytes instead of spaces.
         let last = json.iter().rposition(|byte| *byte != 0);
         let json = &json[..last.map_or(0, |last| last + 1)];
         let objects = json.iter().filter(|byte| **byte == b'{').count() as u64;
         memory::check_fits(name, objects * BYTES_PER_OBJECT, 0, objects)?;
         let root = serde_json::from_slice(json).or_else(|e| {
             let json: Value = serde_json::from_slice(json).unwrap_or_default();
-            // In glTF 1.0, what 2.0 numbers has names.
+            // glTF 1.0 uses names for indices of 2.0.
             let found = match json["meshes"].is_object() {
                 true => "glTF 1.0".to_owned(),
                 false => message(&e.to_string()),
@@ -167,7 +167,7 @@ impl<'f> File<'f> {
             bytes: 0,
         };
         let listed = std::mem::take(&mut file.root.buffers);
-        // Thousands of buffers may be one file.
+        // Thousands of buffers may refer to one file.
         let mut linked: HashMap<&str, Rc<Cow<[u8]>>> = HashMap::new();
         for (index, buffer) in listed.iter().enumerate() {
             let bytes = match &buffer.uri {
@@ -237,7 +237,7 @@ impl<'f> File<'f> {
         Ok(values.chunks_exact(width).map(vector).collect())
     }
 
-    /// Why the bytes of an accessor are not read, if they are not.
+    /// The reason why the bytes of an accessor are not read; `None` if they are.
     pub fn unread(&self, index: Index<Accessor>) -> Option<String> {
         let accessor = self.root.accessors.get(index.value())?;
         let Some(view) = accessor.buffer_view else {
@@ -249,7 +249,7 @@ impl<'f> File<'f> {
         self.compressed(view.extensions.as_ref()?.others.keys(), has_bytes)
     }
 
-    /// The reason of what an extension compresses, unless core glTF has it too.
+    /// The reason why compressed data is not read, unless core glTF has it too.
     pub fn compressed<'e>(
         &self,
         mut extensions: impl Iterator<Item = &'e String>,
@@ -260,9 +260,9 @@ impl<'f> File<'f> {
         Some(format!("is compressed ({})", shortened(name, 40)))
     }
 
-    /// Numbers of an accessor, `width` for each element.
+    /// Numbers of an accessor, `width` per element.
     ///
-    /// Normalised where the accessor says so.
+    /// Normalised if the accessor says so.
     pub fn values(&self, index: Index<Accessor>, width: usize, place: &str) -> Result<Vec<f64>> {
         let accessor = self.get(&self.root.accessors, index, place)?;
         let place = &format!("accessors[{}]", index.value());
@@ -304,7 +304,7 @@ impl<'f> File<'f> {
         Ok(all)
     }
 
-    /// Numbers of elements of a view: their kind, width and whether normalised.
+    /// Numbers of elements of a view, with their type, width and normalisation.
     fn elements(
         &self,
         view: Index<View>,
@@ -348,7 +348,7 @@ pub fn component(accessor: &Accessor) -> Option<ComponentType> {
     }
 }
 
-/// A little-endian number; a fraction where it is normalised.
+/// A little-endian number; a fraction if it is normalised.
 fn number(bytes: &[u8], kind: ComponentType, is_normalised: bool) -> f64 {
     let mut four = [0; 4];
     four[..bytes.len()].copy_from_slice(bytes);
@@ -362,9 +362,9 @@ fn number(bytes: &[u8], kind: ComponentType, is_normalised: bool) -> f64 {
     normalised(raw, kind, is_normalised)
 }
 
-/// A component, normalised where its accessor says so: glTF 2.0, section 3.11.
+/// A component, normalised if its accessor says so: glTF 2.0, section 3.11.
 ///
-/// f32 as the file's bytes hold it.
+/// f32 as in the file's bytes.
 pub fn normalised(raw: f64, kind: ComponentType, is_normalised: bool) -> f64 {
     let largest = match kind {
         ComponentType::I8 => 127.0,

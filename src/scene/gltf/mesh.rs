@@ -20,13 +20,13 @@ pub struct Mesh {
     pub corners: Vec<[u32; 3]>,
     /// Kind of each triangle, by the material of its primitive.
     pub kinds: Vec<SurfaceKind>,
-    /// Sides of each triangle, alike.
+    /// For each triangle, true if it is two-sided.
     pub two_sided: Vec<bool>,
-    /// Single points and those of lines, which are in the box alone.
+    /// Points and vertices of lines, which only count for the box.
     pub loose: Vec<DVec3>,
-    /// `true` if triangles were read, not only boxes of bounds.
+    /// True if triangles were read, not only boxes of bounds.
     pub has_own: bool,
-    /// Why some of it has no triangles.
+    /// The reason why some of it has no triangles.
     pub reason: Option<String>,
 }
 
@@ -41,9 +41,9 @@ impl Mesh {
     }
 }
 
-/// Returns false for a mask that is opaque everywhere.
+/// Returns false for an alpha mask that is opaque everywhere.
 ///
-/// It has no texture, colours of vertices, other kind of colour or low alpha.
+/// Opaque: no texture, vertex colours, other kind of colour or low alpha.
 fn has_holes(material: &Material, primitive: &Primitive) -> bool {
     let own = &material.pbr_metallic_roughness;
     let cutoff = material.alpha_cutoff.unwrap_or_default();
@@ -54,7 +54,7 @@ fn has_holes(material: &Material, primitive: &Primitive) -> bool {
         || extension(material, "KHR_materials_pbrSpecularGlossiness").is_some()
 }
 
-/// Effect of the triangles of a primitive on a ray.
+/// Effect of a primitive's triangles on a ray.
 fn kind_of(material: &Material, primitive: &Primitive) -> SurfaceKind {
     let transmission = extension(material, "KHR_materials_transmission");
     // The factor's default is 0: opaque.
@@ -72,7 +72,7 @@ fn extension<'m>(material: &'m Material, name: &str) -> Option<&'m Value> {
 }
 
 impl File<'_> {
-    /// How many numbers the accessors of a mesh state.
+    /// The number of numbers that the accessors of a mesh state.
     pub fn numbers(&self, mesh: usize) -> u64 {
         let count = |index: Index<Accessor>| {
             let accessor = self.root.accessors.get(index.value());
@@ -107,12 +107,12 @@ impl File<'_> {
                 self.push_box(&mut all, positions, "has no triangles")?;
             }
         }
-        // Each item would have a copy of points without a triangle.
+        // Each item would copy the points that no triangle uses.
         all.points = own_points(&all.points, &mut all.corners, &mut Vec::new());
         Ok(all)
     }
 
-    /// Appends the box of the bounds of positions, which is seen and hides nothing.
+    /// Appends the box of the accessor's bounds, which is visible and hides nothing.
     fn push_box(&self, all: &mut Mesh, positions: Index<Accessor>, reason: &str) -> Result<()> {
         all.reason.get_or_insert_with(|| reason.to_owned());
         let place = format!("accessors[{}]", positions.value());
@@ -136,7 +136,7 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Refuses indices that are no whole numbers.
+    /// Refuses indices that are not unsigned integers.
     fn check_indices(&self, index: Index<Accessor>) -> Result<()> {
         use ComponentType::{U8, U16, U32};
         let accessor = &self.root.accessors[index.value()];
@@ -209,7 +209,7 @@ impl File<'_> {
     }
 }
 
-/// The accessor of positions; `None` where nothing is drawn.
+/// The accessor of positions; `None` if nothing is drawn.
 pub fn positions(primitive: &Primitive) -> Option<Index<Accessor>> {
     let semantic = Checked::Valid(Semantic::Positions);
     primitive.attributes.get(&semantic).copied()

@@ -1,10 +1,10 @@
 //! glTF 2.0 and GLB: every node with a mesh is an item.
 //!
-//! Coordinates are the file's own. Points and lines are in the boxes of their items and have
-//! no triangles. What is compressed has those of the box of its accessor's bounds, which is
-//! seen and hides nothing; in a file without other triangles, items are boxes. Vertices stand
-//! as they are stored, moved by their node alone: joints of skins and weights of morph targets
-//! change nothing. Source: Khronos Group, glTF 2.0 Specification, 2021.
+//! Coordinates are the file's. Points and lines count for the boxes of their items and have no
+//! triangles. Compressed meshes are replaced by the box of their accessor's bounds, which is
+//! visible and hides nothing; in a file without other triangles, items are boxes. Vertices are
+//! transformed by their node alone: skins and morph targets have no effect. Source: Khronos Group,
+//! glTF 2.0 Specification, 2021.
 
 mod animation;
 mod file;
@@ -28,25 +28,24 @@ use super::{
 };
 use crate::input::Result;
 
-/// Bytes of a number of a mesh while it is read: in f64, and as a point or corner.
+/// Bytes of a mesh's number while it is read: in f64, and as a point or corner.
 const BYTES_PER_NUMBER: u64 = 20;
-/// Bytes of an instance while it is read: its transform and that of its item.
+/// Bytes of an instance while it is read: its transform and its item's.
 const BYTES_PER_INSTANCE: u64 = (2 * size_of::<Placed>()) as u64;
-/// Most items of a file: instances of few bytes are many.
+/// Most items of a file: an instance takes few bytes of it.
 const MOST_ITEMS: usize = 1 << 24;
 
-/// Tells glTF by the magic of a GLB, or by the brace that JSON begins with.
+/// Recognises glTF by the magic of a GLB, or by the opening brace of JSON.
 pub fn is_gltf(bytes: &[u8]) -> bool {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{")
 }
 
-/// Reads a scene; `beside` reads the files that it names.
+/// Reads a scene; `beside` reads the files that it refers to.
 ///
-/// # Errors
-/// The first value that is none of glTF 2.0, by its place in the file; a node that is
-/// reached twice; a mesh without triangles and without bounds; a scene that does not fit
-/// into memory.
+/// # Errors The first value that glTF 2.0 does not allow, by its place in the file; a node that is
+/// reached twice; a mesh without triangles and without bounds; a scene that does not fit into
+/// memory.
 pub(super) fn read_beside(
     bytes: &[u8],
     [file, name]: [&str; 2],
@@ -68,7 +67,7 @@ pub(super) fn read_beside(
     let mut labels = Labels::new("name");
     let names = placed.iter().map(|item| &file.root.nodes[item.node].name);
     names.for_each(|name| labels.push(name.as_deref().unwrap_or_default()));
-    // Nodes and buffers are larger than many scenes.
+    // Freed early: nodes and buffers are larger than many scenes.
     (file.root, file.exact, file.buffers) = Default::default();
     Ok(Scene {
         up: UpAxis::Y,
@@ -166,7 +165,7 @@ impl File<'_> {
         transform.is_finite().then_some(transform).ok_or_else(error)
     }
 
-    /// The parts of the transform of a node that it states.
+    /// The stated parts of a node's transform.
     fn parts(&self, index: usize) -> Parts {
         let node = &self.exact.nodes[index];
         let [moved, scaled] = [node.translation, node.scale].map(|v| Some(v?.extend(0.0)));
@@ -175,7 +174,7 @@ impl File<'_> {
 
     /// Instances of a node by EXT_mesh_gpu_instancing; the node itself without them.
     ///
-    /// `before` items are placed already. Each instance has a byte in a buffer or more.
+    /// `before` items are placed already. Each instance has at least a byte in a buffer.
     fn instances(&self, index: usize, before: usize) -> Result<Vec<DAffine3>> {
         let extensions = self.root.nodes[index].extensions.as_ref();
         let instancing = extensions.and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
@@ -196,7 +195,7 @@ impl File<'_> {
             return Err(self.error(place, found, &expected));
         }
         let (before, all) = (before as u64, before as u64 + count);
-        // Asking what is free takes half a millisecond.
+        // Querying the free memory takes half a millisecond.
         if all / memory::ANYWHERE > before / memory::ANYWHERE {
             memory::check_fits(self.name, all * BYTES_PER_INSTANCE, 0, all)?;
         }
@@ -259,7 +258,7 @@ impl File<'_> {
         })
     }
 
-    /// Points of a mesh in the world, as one of its items has them.
+    /// Points of a mesh in world coordinates, for one of its items.
     fn moved(&self, points: &[DVec3], item: &Placed) -> Result<Vec<DVec3>> {
         let moved = |&point: &DVec3| {
             let point = item.world.transform_point3(point);

@@ -1,4 +1,4 @@
-//! Notes about what a glTF file has and this reader leaves out or draws otherwise.
+//! Notes about parts of a glTF file that are ignored or drawn differently.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -13,7 +13,7 @@ use crate::shown::{counted, first_of, shortened};
 
 /// Parts of names of extensions that need no note.
 ///
-/// They are read, have a note of their own, or change no geometry.
+/// They are read, have their own note, or do not change geometry.
 #[rustfmt::skip]
 const HARMLESS: [&str; 7] =
     ["compression", "instancing", "lights", "materials", "quantization", "texture", "visibility"];
@@ -28,7 +28,7 @@ impl File<'_> {
         marked
     }
 
-    /// Tells of items that are boxes, or have parts that are.
+    /// Notes items that are boxes, or have parts that are.
     pub fn note_without_triangles(&self, placed: &[Placed], meshes: &[Mesh]) {
         let reason = |item: &Placed| Some((meshes[item.mesh].reason.as_ref()?, item.mesh));
         let met = placed.iter().rev().filter_map(reason);
@@ -48,7 +48,7 @@ impl File<'_> {
         }
     }
 
-    /// Tells of what is not read, or not as it is drawn; `cameras` have a direction.
+    /// Notes unread parts and differences in drawing; `cameras` have a direction.
     #[rustfmt::skip]
     pub fn note_unread(&self, placed: &[Placed], order: &Order, cameras: usize) {
         let (root, nodes) = (&self.root, &self.root.nodes);

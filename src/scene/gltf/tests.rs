@@ -1,4 +1,4 @@
-//! A turned tetrahedron twice, whole, compressed and damaged.
+//! A rotated tetrahedron twice, whole, compressed and damaged.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -9,7 +9,7 @@ use super::super::{LoadOptions, SeededRng, SurfaceKind, UpAxis};
 use super::*;
 use crate::geometry::Aabb;
 
-/// A tetrahedron, its indices as u16 behind its points.
+/// A tetrahedron; its indices follow as u16 after its points.
 const POINTS: [[f32; 3]; 4] = [
     [0.0, 0.0, 0.0],
     [1.5, 0.0, 0.0],
@@ -59,7 +59,7 @@ pub(super) fn read(file: &Value) -> Result<Scene> {
     read_gltf(text.as_bytes(), "t.gltf", "t", &LoadOptions::default())
 }
 
-/// The points of both items in the world, by hand.
+/// The points of both items in world coordinates, by hand.
 fn world() -> [Vec<DVec3>; 2] {
     let turn = DQuat::from_xyzw(0.1, -0.7, 0.2, 0.6);
     let place = |p: DVec3| {
@@ -91,7 +91,7 @@ fn items_are_the_boxes_of_the_transformed_triangles() {
             let ends = [(written.min, wanted.min), (written.max, wanted.max)];
             assert!(ends.iter().all(|(a, b)| a.distance(*b) < 1e-12));
         }
-        // A negative scale turns them; they are wound outward again.
+        // A negative scale reverses them; the reader winds them outward again.
         assert!(surfaces.volume(item) > 0.0);
     }
     for (written, b) in scene
@@ -149,7 +149,7 @@ pub(super) fn animation_of(scene: &Scene) -> &CameraAnimation {
     animation.as_ref().expect("a good one")
 }
 
-/// The error of the animation of a scene that is read without it.
+/// The error of a scene's animation; the scene is read without it.
 fn animation_error(file: &Value) -> String {
     let animation = read(file).unwrap().animation.expect("an animation");
     animation
@@ -220,7 +220,7 @@ fn points_without_a_triangle_are_not_copied() {
 #[test]
 fn data_of_uris_may_lack_padding_and_have_any_case() {
     let mut file = file();
-    // One byte beyond the 72, whose code ends in padding.
+    // One byte beyond the 72; its base64 ends in padding.
     let uri = file["buffers"][0]["uri"].as_str().unwrap().to_owned() + "AA==";
     let bare = uri.trim_end_matches('=').to_owned();
     for uri in [
@@ -274,7 +274,7 @@ fn cameras_have_their_lens_and_move_as_animated() {
     let view = read(&parallel).unwrap().places[0].view.expect("a lens");
     let numbers = [view.ortho_height, view.aspect, view.far];
     assert_eq!(numbers, [Some(4.0), Some(1.5), Some(9.0)]);
-    // A sign mirrors the view.
+    // A negative sign mirrors the view.
     parallel["cameras"][0]["orthographic"]["xmag"] = json!(-3);
     let mirrored = read(&parallel).unwrap().places[0].view;
     assert_eq!(mirrored, Some(view));
@@ -420,7 +420,7 @@ fn instances_are_items() {
         error.contains("73 elements; expected as many of each, 1 to 72"),
         "{error}"
     );
-    // Four zero bytes, which are no rotation.
+    // Four zero bytes: not a rotation.
     let zero = json!({"bufferView": 0, "componentType": 5121, "count": 1, "type": "VEC4"});
     file["accessors"].as_array_mut().unwrap().push(zero);
     file["nodes"][1]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] =

@@ -12,16 +12,16 @@ use crate::scene::records::Table;
 /// Points, and triangles as indices into them.
 pub type Faces = (Vec<Vec3>, Vec<[u32; 3]>);
 
-/// Segments of a curve between two of its control points that it passes.
+/// Segments of a curve between two control points that it passes through.
 const SEGMENTS: usize = 4;
 /// Triangles of a patch of three by three control points.
 pub const PER_PATCH: usize = 2 * SEGMENTS * SEGMENTS;
-/// Sides of a brush whose faces are computed; of more, the box is taken.
+/// Most sides of a brush whose faces are computed; with more, its box is taken.
 const MOST_SIDES: usize = 64;
-/// Corners of brushes lie on this grid, so that its faces share them.
+/// Grid of brush corners per unit, so that faces of a brush share corners.
 const GRID: f64 = 64.0;
 
-/// Control points of a patch as triangles; an odd number in rows and columns.
+/// Tessellates a patch; rows and columns have an odd number of control points.
 pub fn patch(points: &[Vec3], width: usize) -> Faces {
     let bounds = Aabb::of_points(points.iter().copied());
     let (mut all, mut triangles) = (Vec::new(), Vec::new());
@@ -52,10 +52,9 @@ pub fn patch(points: &[Vec3], width: usize) -> Faces {
     (all, triangles)
 }
 
-/// The box of a brush: its first six sides are those of its box.
+/// The box of a brush: its first six sides.
 ///
-/// # Errors
-/// Sides that are not.
+/// # Errors Sides that are not those of a box.
 pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb> {
     let mut bounds = Aabb::EMPTY;
     for axis in 0..3 {
@@ -74,7 +73,7 @@ pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result
     Ok(bounds)
 }
 
-/// The faces of the convex body behind all sides, if they enclose one.
+/// The faces of the convex body inside all sides, if it is bounded.
 pub fn brush(sides: &[(Vec3, f32)], bounds: &Aabb) -> Option<Faces> {
     if sides.len() > MOST_SIDES {
         return None;
@@ -108,7 +107,7 @@ pub fn brush(sides: &[(Vec3, f32)], bounds: &Aabb) -> Option<Faces> {
     (triangles.len() >= 4).then_some((points, triangles))
 }
 
-/// The part of a plane about a box, turning left about the normal.
+/// The part of a plane around a box, counter-clockwise about the normal.
 fn square((n, d): (DVec3, f64), bounds: &Aabb) -> Option<Vec<DVec3>> {
     let axis = n.abs().max_position();
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);

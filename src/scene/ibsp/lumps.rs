@@ -3,7 +3,7 @@
 use crate::input::{InputError, Result};
 use crate::scene::records::Table;
 
-/// Numbers, names and sizes of the records of the lumps that are read.
+/// Numbers, names and record sizes of the lumps that are read.
 const LUMPS: [(usize, &str, usize); 11] = [
     (0, "entities", 1),
     (1, "shaders", 72),
@@ -36,8 +36,7 @@ pub const OTHERS: [(&[u8], &str); 12] = [
 
 /// Finds the lump of a number.
 ///
-/// # Errors
-/// Another format, a lump beyond the file or one that is no whole number of records.
+/// # Errors Another format, or a lump beyond the file or not a whole number of records long.
 pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>> {
     let row = LUMPS.iter().find(|row| row.0 == number);
     let &(_, name, record) = row.expect("a lump that is read");

@@ -1,9 +1,9 @@
 //! Quake III maps (IBSP of version 46).
 //!
-//! Surfaces and brushes are items, with their triangles; the open leaves of the map's own BSP
-//! tree are regions; spawn points are camera places.
+//! Surfaces and brushes are items, with their triangles; the open leaves of the map's own BSP tree
+//! are regions; spawn points are camera places.
 //!
-//! Moving parts are where the file has them, and coordinates are its own.
+//! Moving parts are at their positions in the file, and coordinates are the file's.
 
 mod faces;
 mod lumps;
@@ -25,30 +25,30 @@ use crate::input::{Result, note_counted};
 
 /// Height of a player's eyes above a spawn point, in map units.
 const EYE_HEIGHT: f64 = 26.0;
-/// Shaders: what fills a brush is solid, or lets light through.
+/// Shader contents: a brush is solid, or translucent.
 const SOLID: i32 = 1;
 const TRANSLUCENT: i32 = 0x2000_0000;
-/// Shaders: a surface that is not drawn.
+/// Shader flag: a surface that is not drawn.
 const NO_DRAW: i32 = 0x80;
-/// Most corners of triangles for each vertex; maps have about two.
+/// Most triangle corners per vertex; maps have about two.
 const MOST_CORNERS: u64 = 16;
 
-/// A map's tree, and which of its clusters see each other.
+/// A map's tree, and the visibility between its clusters.
 #[derive(Clone, Debug)]
 pub struct QuakeMap {
     /// Its open leaves are the regions.
     pub tree: LeafTree,
-    /// How many clusters there are.
+    /// Number of clusters.
     pub clusters: usize,
-    /// Surfaces without triangles, which are no items: flares.
+    /// Number of surfaces without triangles, which are not items: flares.
     pub bare: usize,
-    /// Bytes of a row, and a row of bits for each cluster.
+    /// Bytes per row, and a row of bits for each cluster.
     ///
-    /// `None` where the map has no such table.
+    /// `None` if the map has no visibility table.
     seen: Option<(usize, Vec<u8>)>,
 }
 
-/// Tells a map by its magic; those of other engines are refused by name.
+/// Recognises a map by its magic; also matches formats that are refused by name.
 pub fn is_ibsp(bytes: &[u8]) -> bool {
     let mut others = OTHERS.iter().map(|other| other.0);
     bytes.starts_with(b"IBSP") || others.any(|magic| bytes.starts_with(magic))
@@ -85,9 +85,9 @@ impl QuakeMap {
         })
     }
 
-    /// The map's table of which cluster sees which.
+    /// The map's visibility between clusters.
     ///
-    /// `None` where it has none: all are seen then.
+    /// `None` if it has no such table: all clusters then see each other.
     pub fn sees(&self) -> Option<impl Fn(u32, u32) -> bool> {
         let (row_bytes, rows) = self.seen.as_ref()?;
         Some(move |from: u32, to: u32| {
@@ -109,8 +109,7 @@ fn kind_of(shaders: &Table, shader: usize, is_drawn: bool) -> SurfaceKind {
 
 /// Reads a map as a scene: surfaces first, then brushes, in the order of the file.
 ///
-/// # Errors
-/// The first value that is none of the format, by its byte.
+/// # Errors The first value that the format does not allow, by its byte.
 pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let mut map = QuakeMap::read(bytes, file)?;
     let lump = |number| lump(bytes, file, number);
@@ -152,7 +151,7 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
         };
         push(label, kind, &bounds, brush(&of_brush, &bounds).as_ref());
     }
-    // Coordinates are f32 in the file: no other origin.
+    // Coordinates are f32 in the file: the origin is zero.
     let scene = Scene::about(name, &boxes, DVec3::ZERO)?;
     Ok(Scene {
         unit: Some("map units"),
@@ -232,13 +231,13 @@ fn faces_of(
     };
     let order = surfaces.range(i, 20, corners)?.map(of_corner);
     let order = order.collect::<Result<Vec<u32>, _>>()?;
-    // They turn right, seen from the front.
+    // Clockwise as seen from the front.
     let triangles = order.chunks_exact(3).map(|c| [c[0], c[2], c[1]]);
     let triangles: Vec<[u32; 3]> = triangles.collect();
     Ok((!triangles.is_empty()).then_some((label, bounds, (points, triangles))))
 }
 
-/// The places where players begin, looking as they do.
+/// The places where players start, in their direction of view.
 fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     let (mut places, mut bad, mut moved) = (Vec::new(), 0, 0);
     for words in entities_of(entities) {
@@ -270,7 +269,7 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
         };
         let [pitch, yaw] = [angles.x, angles.y].map(f64::to_radians);
         let level = libm::cos(pitch);
-        // The camera of the scores stands at its very place.
+        // The scoreboard camera stands exactly at its place.
         let is_camera = class == "info_player_intermission";
         let height = if is_camera { 0.0 } else { EYE_HEIGHT };
         places.push(CameraPlace {
@@ -289,7 +288,7 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     places
 }
 
-/// Keys and values of each entity, in turns.
+/// Keys and values of each entity, alternating.
 fn entities_of(mut text: &str) -> Vec<Vec<&str>> {
     let (mut all, mut words) = (Vec::new(), Vec::new());
     while let Some(at) = text.find(['"', '}', '/']) {

@@ -1,7 +1,7 @@
-//! Two rooms and the door between them, as they should be and damaged.
+//! Two rooms and the door between them, intact and damaged.
 //!
-//! The file has three floors, a patch, a mesh and a flare; walls, a ramp and water; three
-//! clusters, of which the first room's does not see the second's, but is seen from it.
+//! The file has three floors, a patch, a mesh and a flare; walls, a ramp and water; three clusters.
+//! The first room's cluster does not see the second's, but is seen from it.
 
 use super::*;
 
@@ -121,11 +121,11 @@ fn each_spawn_point_lies_in_an_open_leaf_and_its_box() {
             assert!(grown.contains_point(p.as_vec3()));
         }
     }
-    // Players have eyes, and the camera of the scores is where it is.
+    // Players have eye height; the scoreboard camera has none.
     let heights = scene.places.iter().map(|place| place.eye.z);
     let standing = 24.0 + EYE_HEIGHT;
     assert_eq!(heights.collect::<Vec<_>>(), [standing, standing, 20.0]);
-    // On a plane, just before it, in a wall, and beyond the map.
+    // On a plane, just in front of it, in a wall, and beyond the map.
     assert_eq!(at(128.0, 64.0, 9.0), [2]);
     assert_eq!(at(128f64.next_down(), 64.0, 9.0), [0]);
     assert!(at(150.0, 10.0, 9.0).is_empty());
@@ -170,7 +170,7 @@ fn brushes_are_closed_and_surfaces_face_the_room() {
             }
         }
     }
-    // Upward from (0, 0) to the middle of the patch, as the curve has it.
+    // Upward from (0, 0) to the middle of the patch, along the curve.
     let patch = (0..scene.items.len()).find(|&i| scene.labels[0].get(i) == "patch");
     let top = surfaces.bounds(patch.unwrap()).max.z;
     assert_eq!(top, 16.0 + 32.0 / 4.0);

@@ -1,4 +1,4 @@
-//! The BSP tree of a Quake III map: which open leaf holds a point, exactly.
+//! The BSP tree of a Quake III map: exact search for a point's open leaf.
 
 use glam::{DVec3, Vec3};
 
@@ -8,11 +8,11 @@ use crate::query::ItemId;
 use crate::scene::bsp::{BspChild, descend, plane_tree, side_of};
 use crate::scene::records::Table;
 
-/// Most nodes on the way to a leaf; maps have less than a hundred.
+/// Most nodes on the way to a leaf; maps have fewer than a hundred.
 const MOST_DEEP: u32 = 1 << 12;
-/// Coordinates are less: they are 32-bit numbers.
+/// Upper bound of coordinates, which are 32-bit numbers.
 const FARTHEST: f64 = 1e10;
-/// Map units by which boxes are grown: map compilers cut their fractions off.
+/// Map units by which boxes are grown: map compilers truncate fractions.
 const GROWTH: f64 = 1.0;
 
 /// A dividing plane.
@@ -20,16 +20,16 @@ const GROWTH: f64 = 1.0;
 pub struct LeafNode {
     /// Points to the front.
     pub normal: Vec3,
-    /// Distance from zero: points of the plane have `normal . p = distance`.
+    /// Distance from the origin: points of the plane have `normal . p = distance`.
     pub distance: f32,
-    /// Front, with the plane itself, then back.
+    /// Front, plane included, then back.
     pub children: [BspChild; 2],
 }
 
 /// A tree whose open leaves are the regions of a map.
 #[derive(Clone, Default, Debug)]
 pub struct LeafTree {
-    /// The root is the first.
+    /// The nodes, the root first.
     pub nodes: Vec<LeafNode>,
     /// Boxes of the open leaves, in the order of the file, grown by a map unit.
     pub boxes: Vec<Aabb>,
@@ -38,14 +38,14 @@ pub struct LeafTree {
 }
 
 impl LeafNode {
-    /// 1, for the back, where `normal . p < distance`; else 0. Exact.
+    /// 1, for the back, if `normal . p < distance`; else 0. Exact.
     pub fn side(&self, p: DVec3) -> usize {
         usize::from(side_of(self.normal.as_dvec3(), self.distance.into(), p) < 0)
     }
 }
 
 impl LeafTree {
-    /// Links the tree; `clusters` is their number, where the file states it.
+    /// Links the tree; `clusters` is their number, if the file states it.
     pub fn read(
         nodes: &Table,
         leaves: &Table,
@@ -81,14 +81,14 @@ impl LeafTree {
             tree.nodes.push(LeafNode {
                 normal: planes.vector(plane, 0)?,
                 distance: planes.float(plane, 12)?,
-                // Nodes that nothing leads to may lead anywhere.
+                // Unreachable nodes may have any children.
                 children: [4, 8].map(|at| child(at).unwrap_or(BspChild::Solid)),
             });
         }
         Ok(tree)
     }
 
-    /// The open leaf that holds a point, as its box does. O(depth).
+    /// The open leaf that contains a point within its box. O(depth).
     pub fn descend(&self, p: DVec3) -> Option<ItemId> {
         if p.abs().max_element() > FARTHEST {
             return None;
@@ -110,12 +110,11 @@ impl LeafTree {
     }
 }
 
-/// Marks the leaves that the first node leads to.
+/// Marks the leaves below the first node.
 ///
 /// Those of a map's moving parts have no node.
 ///
-/// # Errors
-/// Nodes that form no tree, or a very deep one.
+/// # Errors Nodes that do not form a tree, or form a very deep one.
 fn reached_leaves(nodes: &Table, leaves: &Table) -> Result<Vec<bool>> {
     let error = |node, at, found: String| Err(nodes.error(node, at, found, "a BSP tree"));
     if nodes.len() == 0 {

@@ -1,6 +1,6 @@
 //! The WAD format: the lumps of a file, and those of a map.
 //!
-//! After the unofficial Doom specs 1.666, Matthew S. Fell 1994. No byte is trusted.
+//! From the unofficial Doom specs 1.666, Matthew S. Fell 1994. No byte is trusted.
 
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -14,13 +14,13 @@ const LUMPS: [&str; 13] = [
     "TEXTMAP", "THINGS", "LINEDEFS", "SIDEDEFS", "VERTEXES", "SEGS", "SSECTORS", "NODES",
     "SECTORS", "REJECT", "BLOCKMAP", "BEHAVIOR", "SCRIPTS",
 ];
-/// Names of the lump right behind a map's marker.
+/// Names of the first lump after a map's marker.
 const FIRST: [&str; 2] = ["THINGS", "TEXTMAP"];
-/// Lumps that a node builder fills.
+/// Lumps filled by a node builder.
 const BUILT: [&str; 3] = ["SEGS", "SSECTORS", "NODES"];
-/// Lumps whose lack is the same as their being empty.
+/// Lumps that may be missing: as good as empty.
 const MAY_LACK: [&str; 4] = ["SEGS", "SSECTORS", "NODES", "REJECT"];
-/// How nodes that are not Doom's own begin.
+/// First bytes of nodes in formats other than Doom's own.
 const NODE_KINDS: [(&str, &str); 9] = [
     ("XNOD", "extended"),
     ("ZNOD", "compressed extended"),
@@ -34,7 +34,7 @@ const NODE_KINDS: [(&str, &str); 9] = [
 ];
 const OWN_NODES: &str = "nodes in Doom's own format, as node builders (ZDBSP, ZenNode) write them \
                          unless told otherwise";
-/// Maps that a message names.
+/// Most maps that a message names.
 const MOST_NAMED: usize = 32;
 
 /// A file's directory.
@@ -53,8 +53,8 @@ struct Lump {
 impl<'a> Wad<'a> {
     /// Reads the directory.
     ///
-    /// The position of a lump is checked when the lump is read: damage in another does not
-    /// concern a map.
+    /// The range of a lump is checked when the lump is read: damage elsewhere does not affect a
+    /// map.
     pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self> {
         let mut wad = Wad {
             file,
@@ -91,7 +91,7 @@ impl<'a> Wad<'a> {
 
     /// The names of the maps and the indices of their markers, in file order.
     ///
-    /// The last of maps of one name, as engines have it.
+    /// The last of several maps with one name counts, as in engines.
     pub fn markers(&self) -> Vec<(&str, usize)> {
         let mut seen = HashSet::new();
         let all = (0..self.lumps.len()).rev().filter(|&at| self.is_marker(at));
@@ -130,9 +130,8 @@ impl<'a> Wad<'a> {
 
     /// The tables of the named map, or of the only one, from THINGS to REJECT.
     ///
-    /// REJECT is empty if the map has none.
-    /// A map's lumps are found by name behind its marker, up to the next marker or to
-    /// the first that the order of a map's lumps does not allow; others are passed over.
+    /// REJECT is empty if the map has none. A map's lumps are found by name after its marker, up to
+    /// the next marker or the first lump out of order; other lumps are skipped.
     pub fn tables(&self, map: Option<&str>) -> Result<[Table<'_>; 9]> {
         let (name, marker) = self.marker(map)?;
         let mut last = None;

@@ -1,4 +1,4 @@
-//! Files with a map as it should be, as other formats have it, and damaged.
+//! Files with an intact map, with maps in other formats, and damaged ones.
 
 use super::super::WadMap;
 use super::*;
@@ -83,7 +83,7 @@ fn what_a_map_lacks_is_not_taken_from_the_next() {
     for at in 2..whole.len() {
         let mut lumps = whole.clone();
         let (name, _) = lumps.remove(at);
-        // The next map as it should be, without THINGS, and from the same lump on.
+        // The next map intact, without THINGS, and starting with the same lump.
         for first in [0, 1, at - 1] {
             let mut both = lumps.clone();
             both.push(("MAP13".to_owned(), Vec::new()));
@@ -128,7 +128,7 @@ fn other_formats_are_named() {
     let udmf = ["MAP01", "TEXTMAP", "ZNODES", "ENDMAP"];
     let udmf = udmf.map(|name| (name.to_owned(), Vec::new())).to_vec();
     refused(&udmf, None, "MAP01 in the format of UDMF (TEXTMAP);");
-    // Beside another map each is named as it is.
+    // Together with another map each keeps its name.
     let both = [udmf, map12()].concat();
     refused(&both, None, "2 maps, MAP01, MAP12;");
     refused(&both, Some("MAP01"), "UDMF");
@@ -145,14 +145,14 @@ fn what_engines_pass_over_is_passed_over() {
     assert_eq!(read(&file(&both), Some("MAP12")), own);
     let both = [map12(), first].concat();
     assert_ne!(read(&file(&both), Some("MAP12")), own);
-    // A marker with contents; a name with junk behind its end.
+    // A marker with contents; a name with junk after its end.
     let mut lumps = with("MAP12", |bytes| bytes.extend(b"junk"));
     lumps.push(("SPRITE".to_owned(), b"abc".to_vec()));
     let mut bytes = file(&lumps);
     let entry = |at: usize| 12 + 16 * at;
     bytes[entry(0) + 14..][..2].copy_from_slice(b"\xFFx");
     assert_eq!(read(&bytes, Some("MAP12")), own);
-    // The place of an empty lump, and damage in lumps that are not read.
+    // The position of an empty lump, and damage in lumps that are not read.
     lumps[0].1.clear();
     let (marker, other) = (entry(0), entry(lumps.len() - 1));
     for offset in [-1, i32::MIN, i32::MAX, 7] {

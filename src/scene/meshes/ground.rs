@@ -1,6 +1,6 @@
 //! A heightfield, and a forest on it.
 //!
-//! Neighbouring tiles compute the points of their common edge alike.
+//! Neighbouring tiles compute identical points for their common edge.
 
 use glam::{DVec3, Vec3};
 
@@ -43,7 +43,7 @@ impl Ground {
         RELIEF * fractal(DVec3::new(x / HILL, y / HILL, 0.5), 7, self.seed)
     }
 
-    /// The tile in a column and a row.
+    /// The tile at a column and a row.
     fn tile(&self, column: usize, row: usize) -> Shape {
         let mut shape = Shape::default();
         for j in 0..=EDGE {
@@ -87,13 +87,13 @@ pub fn terrain(triangles: usize, seed: u64) -> Surfaces {
 const GROUND: f64 = 0.3;
 /// Share of the plants that are trees.
 const TREES: f64 = 0.4;
-/// Cards of a bush.
+/// Leaf cards of a bush.
 const CARDS: usize = 12;
 
 /// Trees and bushes on a terrain.
 ///
-/// Ground first, then plants until there are enough triangles. A tree is a closed trunk and
-/// three closed cones; a bush is a dozen leaf cards, cut out and two-sided.
+/// Ground first, then plants until there are enough triangles. A tree is a closed trunk and three
+/// closed cones; a bush is a dozen leaf cards, cut out and two-sided.
 pub fn forest(triangles: usize, seed: u64) -> Surfaces {
     let mut surfaces = Surfaces::about(DVec3::ZERO);
     let ground = Ground::of((triangles as f64 * GROUND) as usize, seed);
@@ -113,7 +113,7 @@ pub fn forest(triangles: usize, seed: u64) -> Surfaces {
     surfaces
 }
 
-/// 118 triangles. The cones overlap: each is closed for itself.
+/// A tree of 118 triangles, whose cones overlap: each is closed in itself.
 fn tree(base: Vec3, rng: &mut SeededRng) -> Shape {
     let tall = rng.between(4.0, 20.0) as f32;
     let mut shape = column(base - Vec3::Z * 0.5, tall * 0.03, tall * 0.3 + 0.5, 8);
@@ -124,7 +124,7 @@ fn tree(base: Vec3, rng: &mut SeededRng) -> Shape {
     shape
 }
 
-/// 24 triangles.
+/// A bush of 24 triangles.
 fn bush(base: Vec3, rng: &mut SeededRng) -> Shape {
     let size = rng.between(0.4, 1.2) as f32;
     let mut shape = Shape::default();
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use std::collections::HashMap;
 
-    /// Edges by the coordinates of their ends.
+    /// An edge by the coordinates of its ends.
     type Edge = [[u32; 3]; 2];
 
     #[test]

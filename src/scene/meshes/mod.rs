@@ -1,6 +1,6 @@
 //! Generated meshes: scenes of triangles.
 //!
-//! Each is made from a number of triangles and a seed. One file a mesh; the table `MESHES` in
+//! Each is made from a number of triangles and a seed, in its own file; the table `MESHES` in
 //! `generate` names them all.
 
 pub mod ground;
@@ -57,7 +57,7 @@ mod tests {
         }
     }
 
-    /// An item's box holds its triangles exactly, wherever in the world they are.
+    /// An item's box contains its triangles exactly, anywhere in the world.
     #[test]
     fn boxes_hold_their_triangles() {
         for offset in ["0", "1e7", "-123456.789"] {
@@ -71,8 +71,9 @@ mod tests {
         }
     }
 
-    /// Pinned digests: a change of any generated mesh is a change of every published
-    /// figure and belongs into the CHANGELOG.
+    /// Pinned digests of generated meshes.
+    ///
+    /// Changing a mesh changes every published figure and belongs in the CHANGELOG.
     #[test]
     fn generated_meshes_are_the_published_ones() {
         let digest = |mesh: &Family| {

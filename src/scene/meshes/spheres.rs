@@ -1,6 +1,6 @@
 //! Spheres and a statue, both from the geodesic sphere.
 //!
-//! A geodesic sphere is an icosahedron whose faces are cut into f² triangles, pushed out to
+//! A geodesic sphere is an icosahedron whose faces are divided into f² triangles and projected onto
 //! the sphere. Neighbouring faces share the points of their edge.
 
 use std::collections::HashMap;
@@ -11,14 +11,14 @@ use crate::scene::families::lattice_cell;
 use crate::scene::rng::fractal;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
-/// Cuts along the edges of the icosahedron.
+/// Divisions per edge of the icosahedron.
 const FREQUENCY: u32 = 8;
-/// Distance of the centres before they are moved, world units.
+/// Distance of the centres before they are displaced, world units.
 const SPACING: f64 = 6.0;
 
-/// A field of spheres in space, each with all directions.
+/// A field of spheres in space: faces in all directions.
 ///
-/// They lie near the points of a lattice; none touches another.
+/// They lie near the points of a lattice; no two touch.
 pub fn spheres(triangles: usize, seed: u64) -> Surfaces {
     let (directions, faces) = icosphere(FREQUENCY);
     let count = (triangles / faces.len()).max(1);
@@ -35,18 +35,19 @@ pub fn spheres(triangles: usize, seed: u64) -> Surfaces {
     surfaces
 }
 
-/// Bulges (positive) and hollows of the body.
+/// Number of bulges (positive) and hollows of the body.
 const LOBES: usize = 12;
-/// How much taller than wide it is.
+/// Height / width.
 const TALL: f64 = 1.8;
 /// Radius without bulges, world units.
 const RADIUS: f64 = 1.0;
 
 /// A statue-like blob of about `triangles` triangles in one item.
 ///
-/// A sphere whose radius changes with the direction, smoothly at large and roughly at small.
+/// A sphere whose radius varies with the direction: smoothly at large scale, roughly at small
+/// scale.
 ///
-/// Each direction meets the surface once, so it is closed and never crosses itself.
+/// Each direction meets the surface once, so it is closed and never intersects itself.
 pub fn statue(triangles: usize, seed: u64) -> Surfaces {
     let frequency = libm::sqrt(triangles as f64 / 20.0) as u32;
     let (directions, faces) = icosphere(frequency);
@@ -56,7 +57,7 @@ pub fn statue(triangles: usize, seed: u64) -> Surfaces {
         let direction = rng.normal3().normalize_or(DVec3::Z);
         (direction, rng.between(-0.3, 0.6), rng.between(4.0, 30.0))
     });
-    // Between 0.2 and some units.
+    // Between 0.2 and a few units.
     let radius = |d: DVec3| {
         let bulge = |(at, height, sharp): &(DVec3, f64, f64)| {
             height * libm::exp(-sharp * (1.0 - at.dot(d)))
@@ -77,7 +78,7 @@ const PHI: f64 = 1.618_033_988_749_895;
 
 /// A corner of the icosahedron.
 ///
-/// The four of a golden rectangle in each of three planes.
+/// In each of three planes, the four corners of a golden rectangle.
 fn vertex(at: usize) -> DVec3 {
     let sign = |bit: usize| if at & bit == 0 { -1.0 } else { 1.0 };
     let mut vertex = [sign(1), -PHI * sign(2), 0.0];
@@ -85,7 +86,7 @@ fn vertex(at: usize) -> DVec3 {
     vertex.into()
 }
 
-/// Three corners a face, counter-clockwise from outside.
+/// Three corners per face, counter-clockwise from outside.
 const FACES: [usize; 60] = [
     0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6, 7, 1,
     8, 3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1,
@@ -97,14 +98,14 @@ const FACES: [usize; 60] = [
 pub fn icosphere(frequency: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let f = frequency.max(1);
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    // Point of each set of corners with their weights, without those of weight zero.
+    // Point of each set of corners and their weights, zero weights omitted.
     let mut ids: HashMap<[(usize, u32); 3], u32> = HashMap::new();
     let mut point = |face: [usize; 3], weights: [u32; 3]| {
         let mut key = [0, 1, 2].map(|k| match weights[k] {
             0 => (usize::MAX, 0),
             weight => (face[k], weight),
         });
-        // The same sum in the same order, whichever face asks.
+        // The same sum in the same order for each adjoining face.
         key.sort_unstable();
         *ids.entry(key).or_insert_with(|| {
             let parts = key.iter().filter(|(_, weight)| *weight > 0);

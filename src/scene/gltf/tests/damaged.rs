@@ -1,4 +1,4 @@
-//! Files with something wrong.
+//! Damaged files.
 
 use super::*;
 

@@ -9,7 +9,7 @@ fn glass_is_clear() {
     glass["materials"][0] = json!({"extensions": transmission});
     let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
     assert_eq!(surfaces.kinds, [SurfaceKind::Clear; 8]);
-    // The factor is 0 unless it is said.
+    // The factor defaults to 0.
     glass["materials"][0] = json!({"extensions": {"KHR_materials_transmission": {}}});
     let surfaces = read(&glass).unwrap().surfaces.expect("triangles");
     assert_eq!(surfaces.kinds, [SurfaceKind::Opaque; 8]);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// The file with another item that has a primitive of its own.
+/// The file with another item that has its own primitive.
 fn beside(primitive: Value) -> Value {
     let mut file = file();
     let push = |all: &mut Value, value: Value| all.as_array_mut().unwrap().push(value);
@@ -41,7 +41,7 @@ fn points_and_lines_are_in_the_box_of_their_item_alone() {
                 .len(),
             8
         );
-        // In the same mesh, of which only two points have triangles then.
+        // In the same mesh, where then only two points have triangles.
         let mut same = file();
         same["meshes"][0]["primitives"]
             .as_array_mut()
@@ -64,7 +64,7 @@ fn what_is_compressed_is_seen_as_the_box_of_its_bounds() {
     let whole = read(&file()).unwrap();
     let primitive = json!({"attributes": {"POSITION": 0}, "extensions": draco()});
     let mut file = beside(primitive);
-    // Nothing that is compressed is required: core glTF has it too.
+    // The compression is not required: core glTF has the data too.
     assert_eq!(read(&file).unwrap().surfaces.unwrap().of_item[2], 8..9);
     file["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
     let scene = read(&file).unwrap();
