@@ -1,4 +1,4 @@
-//! Reading JSON, with errors that name place, text found and text expected.
+//! Reading JSON, with errors that name place, found text and expected text.
 //!
 //! Messages do not repeat the wording of the JSON crate.
 
@@ -7,19 +7,19 @@ use serde_json::error::Category;
 
 use crate::shown::plain;
 
-/// Difference of a text from the JSON that was expected.
+/// Difference between a text and the expected JSON.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{}: {found}; expected {}", self.place(), self.expected_of("JSON"))]
 pub struct JsonError {
-    /// Line, from 1; the reader of a file of several texts sets it to that of the file.
+    /// Line, from 1; a reader of files with several texts sets it to that of the file.
     pub line: usize,
     /// Bytes, from 1.
     pub column: usize,
     /// Path of the value, `cells[3].rank`; empty for the whole.
     pub path: String,
-    /// Text that was found.
+    /// Found text.
     pub found: String,
-    /// Value expected in that place, where the text is JSON at all.
+    /// Expected value, if the text is JSON at all.
     pub expected: Option<String>,
 }
 
@@ -42,10 +42,9 @@ impl JsonError {
     }
 }
 
-/// Reads a value. A byte order mark in front is skipped.
+/// Reads a value, skipping a leading byte order mark.
 ///
-/// # Errors
-/// Bytes that are no UTF-8, no JSON, or of another form.
+/// # Errors Bytes that are not UTF-8, not JSON, or of another form.
 pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
     // The byte order mark that some editors write.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -90,14 +89,14 @@ pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
 
 /// Number of values of the list at a path, if the text is JSON.
 ///
-/// The reader takes a list of too many values for bad syntax.
+/// The reader reports a list of too many values as bad syntax.
 fn too_long(text: &str, path: &str) -> Option<usize> {
     let json: serde_json::Value = serde_json::from_str(text).ok()?;
     let pointer = path.replace(['.', '['], "/").replace(']', "");
     Some(json.pointer(&format!("/{pointer}"))?.as_array()?.len())
 }
 
-/// Text found and text expected, from the reader's message.
+/// Found and expected text, from the reader's message.
 pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
     let said = error.to_string();
     let said = said.split(" at line ").next().unwrap_or_default();
@@ -108,7 +107,7 @@ pub fn told(error: &serde_json::Error) -> (String, Option<String>) {
     }
 }
 
-/// The same from the words with which serde refuses a value.
+/// Found and expected text, from serde's message about a value.
 pub fn in_words(said: &str) -> (String, Option<String>) {
     let mut cuts = [", expected ", ", there are "].into_iter();
     match cuts.find_map(|between| said.rsplit_once(between)) {

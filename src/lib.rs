@@ -62,13 +62,13 @@
 //! say y; bounds are closed, so touching counts as visible; plane normals point inward;
 //! angles are degrees; items are numbered by their index in the scene.
 
-// docs.rs says of each item which feature it needs.
+// docs.rs shows for each item which feature it needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(missing_docs)]
-// The program uses more of the modules than a library build has: dead code shows with `cli`.
+// The program uses more of the modules than a library build: dead code is only reported with `cli`.
 #![cfg_attr(not(feature = "cli"), allow(unused))]
-// Denied, not forbidden, where there are vectors: one folder may, and says so
-// itself. With plain arrays there is none.
+// Denied instead of forbidden if there are vectors: one folder may use it, and declares so. With
+// plain arrays there is none.
 #![deny(unsafe_code)]
 #![cfg_attr(
     any(not(target_arch = "x86_64"), miri, plain_vectors),
@@ -117,7 +117,7 @@ pub mod visibility;
 
 /// Names for queries and experiments.
 ///
-/// A structure of one's own takes more, of [`index`] and [`query`]: see
+/// Your own structure needs more names, from [`index`] and [`query`]: see
 /// `examples/enter_your_crate.rs`.
 pub mod prelude {
     pub use crate::camera::{Camera, Lens, PlaneOptions, look_at};

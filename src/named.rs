@@ -1,11 +1,12 @@
-//! Tables in the source, and how they are written down.
+//! Tables in the source, and the macros that declare them.
 //!
-//! Enums whose values have names for people and files, rows of structs, and fields with default
+//! Enums whose values have names for users and files, rows of structs, and fields with default
 //! values.
 
 /// Declares an enum with its names: `ALL` in this order, and `name`.
-/// With the name of a table behind the enum's, each name is followed by its description,
-/// which is its doc comment, and the table holds all three as rows.
+///
+/// With a table name after the enum's, each name is followed by its description, which becomes its
+/// doc comment, and the table has all three as rows.
 macro_rules! named {
     ($(#[$about:meta])* $vis:vis enum $Enum:ident {
         $($(#[$of:meta])* $value:ident = $name:literal,)+
@@ -38,13 +39,13 @@ macro_rules! named {
             }
         }
 
-        /// Every value with its name and what it is.
+        /// Every value with its name and description.
         $vis const $TABLE: [($Enum, &str, &str); $Enum::ALL.len()] =
             [$(($Enum::$value, $name, $what)),+];
     };
 }
 
-/// Declares a struct whose fields stand beside their default values.
+/// Declares a struct with its fields next to their default values.
 macro_rules! defaults {
     ($(#[$about:meta])* $vis:vis struct $Struct:ident {
         $($(#[$of:meta])* pub $field:ident: $Type:ty = $value:expr,)+
@@ -62,7 +63,7 @@ macro_rules! defaults {
     };
 }
 
-/// A table of structs, the names of the fields written once.
+/// A table of structs, with the names of the fields written once.
 macro_rules! rows {
     (@row $Row:ident { $($field:ident),+ } $($value:expr),+) => {
         $Row { $($field: $value),+ }

@@ -1,13 +1,14 @@
-//! Text from outside as it is shown, and counts with the word they count.
+//! Text from outside as it is displayed, and counts with their nouns.
 //!
-//! Leaves out everything that a terminal, a picture or a page would obey. Defines which
-//! characters are harmless, for every output there is.
+//! Escapes everything that a terminal, a picture or a page would interpret. Defines the harmless
+//! characters, for all outputs.
 
 use std::io;
 
-/// Text on one line: line breaks and tabs are spaces, and what would steer the
-/// reader's terminal, turn the direction of the text or be no XML stands there
-/// as its number, `\u{1b}`.
+/// Text on one line: line breaks and tabs are spaces.
+///
+/// Characters that would control the reader's terminal, change the direction of the text or are not
+/// XML are escaped by number, `\u{1b}`.
 pub fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -22,19 +23,21 @@ pub fn plain(text: &str) -> String {
     out
 }
 
-/// The same for text of several lines: line feeds stay.
+/// [`plain`] for text of several lines: line feeds stay.
 pub fn lines(text: &str) -> String {
     let plain: Vec<String> = text.split('\n').map(plain).collect();
     plain.join("\n")
 }
 
-/// [`plain`] text of at most `most` characters and the mark of a cut.
+/// [`plain`] text of at most `most` characters plus an ellipsis.
 pub fn shortened(text: &str, most: usize) -> String {
     without_middle(&plain(text), [most, 0])
 }
 
-/// [`plain`] text of a message. Very long words lose their middle, and so does
-/// the whole: a name of any length leaves place and expectation.
+/// [`plain`] text of a message.
+///
+/// Very long words lose their middle, and so does the whole: a name of any length leaves place and
+/// expectation readable.
 pub fn message(text: &str) -> String {
     let text = plain(text);
     let words = text.split(' ').map(|word| without_middle(word, [160, 80]));
@@ -42,10 +45,10 @@ pub fn message(text: &str) -> String {
     without_middle(&words.join(" "), [1200, 400])
 }
 
-/// The end of a message about an error of the file system.
+/// The end of a message about an I/O error.
 ///
-/// "; expected an existing file"; `what` is a file or a folder. Nothing where the error's
-/// own text has an expectation.
+/// "; expected an existing file"; `what` is a file or a folder. Empty if the error's own text has
+/// an expectation.
 pub fn expected_by(error: &io::Error, what: &str) -> String {
     use io::ErrorKind::*;
     if error.to_string().contains("expected") {
@@ -74,20 +77,20 @@ pub(crate) fn kind_of(error: &io::Error) -> io::ErrorKind {
 
 /// The expectation of a message about a file with several parts.
 pub(crate) fn part_hint(file: &str, name: &str) -> String {
-    // A value that begins with a minus needs the sign, a word of its own the dashes.
+    // A value that starts with a minus needs `=`, a separate argument `--`.
     if file == "-" || file.starts_with("-#") {
         return format!("one of them by name, as in '--scene={file}#{name}' or '-- {file}#{name}'");
     }
     format!("one of them by name, as in '{file}#{name}'")
 }
 
-/// Nanoseconds with three significant digits and a fitting unit.
+/// Nanoseconds with three significant digits in a suitable unit.
 pub fn time(ns: f64) -> String {
     let (size, name) = unit(ns);
     format!("{} {name}", significant(ns / size))
 }
 
-/// The unit that fits a time, in ns, and its name.
+/// The unit suited to a time, in ns, and its name.
 pub fn unit(ns: f64) -> (f64, &'static str) {
     match ns {
         n if n < 999.5 => (1.0, "ns"),
@@ -97,8 +100,9 @@ pub fn unit(ns: f64) -> (f64, &'static str) {
     }
 }
 
-/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12,345; an exponent only
-/// where the number would be longer than anything measured.
+/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12,345.
+///
+/// An exponent only for numbers longer than any measurement.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -110,14 +114,14 @@ pub fn significant(value: f64) -> String {
         let sign = if value < 0.0 { "-" } else { "" };
         return sign.to_owned() + &count(value.abs().round() as usize);
     }
-    // Of the rounded number: 9.996 is 10.0.
+    // Of the rounded number: 9.996 becomes 10.0.
     let rounded = format!("{:.2e}", value.abs());
     let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse().ok());
     let digits = (2 - exponent.unwrap_or(0)).clamp(0, 12) as usize;
     format!("{value:.digits$}")
 }
 
-/// The first and the last characters of a longer text, with the mark of a cut.
+/// The first and the last characters of a longer text, with an ellipsis between.
 pub fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
     let count = text.chars().count();
     if count <= first + last {
@@ -129,8 +133,10 @@ pub fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
     kept
 }
 
-/// Control characters, marks and overrides of the direction, characters without
-/// a width, tags, and what XML does not allow at all.
+/// Tests for characters that must not reach an output.
+///
+/// Control characters, marks and overrides of the direction, zero-width characters, tags, and
+/// characters that XML does not allow.
 fn is_harmful(c: char) -> bool {
     c.is_control()
         || matches!(c,
@@ -145,7 +151,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// Whole numbers in groups of three.
+/// Whole numbers with digits in groups of three.
 pub fn count(value: usize) -> String {
     let digits = value.to_string();
     let groups = digits.as_bytes().rchunks(3).rev();
@@ -153,7 +159,7 @@ pub fn count(value: usize) -> String {
     groups.collect::<Vec<_>>().join(",")
 }
 
-/// All digits of a number, with an exponent if it is longer than any count.
+/// All digits of a number; an exponent if it is longer than any count.
 pub fn number(value: f64) -> String {
     match value.abs() < 1e15 {
         true => value.to_string(),
@@ -180,7 +186,7 @@ pub fn first_of(names: &[impl AsRef<str>], most: usize) -> String {
     }
 }
 
-/// Regular words only.
+/// The plural of a regular noun.
 fn plural(one: &str) -> String {
     let stem = one.strip_suffix('y');
     let stem = stem.filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
@@ -214,7 +220,7 @@ mod tests {
             ("\u{feff}a\u{200b}", "\\u{feff}a\\u{200b}"),
         ] {
             assert_eq!(plain(text), wanted);
-            // Shown twice is shown once.
+            // Applying it twice changes nothing.
             assert_eq!(plain(&plain(text)), wanted);
         }
         assert_eq!(lines("a\n\u{1b}b\r\n"), "a\n\\u{1b}b \n");

@@ -1,8 +1,8 @@
 //! The little language of the command line: `name:key=value,key=value`.
 //!
-//! Names a scene family, a camera path or a structure together with its parameters. Defines the
-//! syntax, numbers such as `100k` or `2%`, and the nearest suggestion for a misspelt word; what
-//! the words mean is up to their owners.
+//! A scene family, a camera path or a structure with its parameters. Defines the syntax, numbers
+//! such as `100k` or `2%`, and the nearest suggestion for a misspelt word; the meaning of words is
+//! defined by their users.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -26,7 +26,7 @@ pub struct Spec {
 pub struct SpecError(String);
 
 impl SpecError {
-    /// An error that reads as this text.
+    /// An error with this text.
     pub fn new(message: impl fmt::Display) -> Self {
         SpecError(message.to_string())
     }
@@ -47,7 +47,7 @@ impl SpecError {
     }
 }
 
-/// The known word most like `word`, if any is alike at all.
+/// The known word most similar to `word`, if any is similar enough.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
     let alike = known.into_iter().map(|k| (likeness(&word, k), k));
@@ -55,16 +55,17 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     Some(alike.max_by(|a, b| a.0.total_cmp(&b.0))?.1)
 }
 
-/// 1 for equal words. Swapped and missing letters count little (Damerau), and
-/// so does a missing ending (Jaro and Winkler).
+/// Similarity of two words; 1 if equal.
+///
+/// Swapped and missing letters count little (Damerau), and so does a missing ending (Jaro and
+/// Winkler).
 fn likeness(word: &str, known: &str) -> f64 {
     let edits = strsim::normalized_damerau_levenshtein(word, known);
     let prefix = strsim::jaro_winkler(word, known) - 0.2;
     edits.max(if word.len() > 2 { prefix } else { 0.0 })
 }
 
-/// A number with an optional suffix: `250`, `1e6`, `100k`, `10M`, `2%`,
-/// `1_000`.
+/// A number with an optional suffix: `250`, `1e6`, `100k`, `10M`, `2%`, `1_000`.
 pub fn parse_number(text: &str) -> Option<f64> {
     let plain = text.trim().replace('_', "");
     let (digits, exponent) = match plain.char_indices().next_back()? {
@@ -73,7 +74,7 @@ pub fn parse_number(text: &str) -> Option<f64> {
         (at, '%') => (&plain[..at], "e-2"),
         _ => (plain.as_str(), ""),
     };
-    // In one rounding: 2.01 times a thousand is not 2,010.
+    // In one rounding: 2.01 times a thousand is not exactly 2,010.
     let value = format!("{digits}{exponent}").parse::<f64>().ok()?;
     value.is_finite().then_some(value)
 }
@@ -84,8 +85,9 @@ impl Spec {
         Spec::parse_behind("", text)
     }
 
-    /// The same of a name that begins with `prefix`, if the text does, and may hold a
-    /// `:` there: `mesh:statue:n=1M`.
+    /// [`Spec::parse`] for names with an optional `prefix`, which may contain a `:`.
+    ///
+    /// Such as `mesh:statue:n=1M`.
     pub fn parse_behind(prefix: &str, text: &str) -> Result<Spec, SpecError> {
         let begun = text.strip_prefix(prefix).map_or(0, |_| prefix.len());
         let end = text[begun..].find(':').map_or(text.len(), |at| begun + at);
@@ -108,9 +110,10 @@ impl Spec {
         })
     }
 
-    /// Splits a comma-separated list of specs whose parameters use commas as
-    /// well: `bvh:leaf=4,preset=fast,linear` is two specs, because a bare
-    /// `key=value` belongs to the spec before it.
+    /// Splits a comma-separated list of specs whose parameters use commas as well.
+    ///
+    /// `bvh:leaf=4,preset=fast,linear` is two specs: a bare `key=value` belongs to the spec before
+    /// it.
     pub fn split_list(text: &str) -> Vec<String> {
         let mut specs: Vec<String> = Vec::new();
         for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
@@ -130,7 +133,7 @@ impl Spec {
         &self.name
     }
 
-    /// All parameters as typed, for owners that check them themselves.
+    /// All parameters as typed, for users that check them themselves.
     pub fn given(&self) -> impl Iterator<Item = (&str, &str)> {
         self.given.iter().map(|(k, v)| (k.as_str(), v.as_str()))
     }
@@ -167,7 +170,7 @@ impl Spec {
             true => format!("a number above {low} and below {high}"),
             false => format!("a number above {low}"),
         };
-        // A default can be out of range too; then it was not typed.
+        // A default can be out of range too, without having been typed.
         let found = self.text(key).unwrap_or_else(|| format!("{value:?}"));
         Err(self.bad(key, &found, &wanted))
     }
@@ -184,7 +187,7 @@ impl Spec {
         };
         // Plain digits first: a 64-bit seed does not fit an f64.
         let exact = text.replace('_', "").parse::<u64>().ok();
-        // No part of anything: 200 % are not two items.
+        // Not a share: 200 % is not two items.
         let is_part = text.ends_with('%');
         let is_whole = |v: &f64| !is_part && v.fract() == 0.0 && (0.0..9e15).contains(v);
         let rounded = parse_number(&text).filter(is_whole).map(|v| v as u64);
@@ -196,7 +199,7 @@ impl Spec {
         })
     }
 
-    /// Call last: refuses parameters that were not read.
+    /// Refuses parameters that were not read; call it last.
     pub fn finish(&self) -> Result<(), SpecError> {
         let known = self.known.iter().copied();
         let what = format!("parameter of '{}':", self.name);

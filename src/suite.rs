@@ -1,6 +1,6 @@
-//! The suites of the main job: which scenes, which ways through them, how long.
+//! The suites of the main job: scenes, camera paths, and times.
 //!
-//! Those of the program are in `suites.toml`; a file of the user takes the place of a name.
+//! Built-in ones are in `suites.toml`; a user's file replaces a name.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub struct Suite {
     pub name: String,
     /// One line for `cullbench list scenes`.
     pub summary: String,
-    /// The list of structures where none are named.
+    /// The list of structures if none are named.
     pub structures: String,
     /// Processes, rounds and times.
     pub effort: Effort,
@@ -31,18 +31,18 @@ pub struct Suite {
     pub scenes: Vec<PlannedScene>,
 }
 
-/// A suite as a user writes it; a field that is not known is refused.
+/// A suite as a user writes it; unknown fields are refused.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
-    /// The suite whose rounds and structures it takes where it states none.
+    /// The suite that provides rounds and structures if these are missing.
     like: Option<String>,
     structures: Option<String>,
     processes: Option<u32>,
     scenes: Vec<PlannedScene>,
 }
 
-/// All suites. The first one is what `cullbench run` does by itself.
+/// All suites; the first one is the default of `cullbench run`.
 pub static SUITES: LazyLock<Vec<Suite>> = LazyLock::new(|| {
     #[derive(Deserialize)]
     struct All {
@@ -55,14 +55,16 @@ pub static SUITES: LazyLock<Vec<Suite>> = LazyLock::new(|| {
 /// The suite that fetched scenes join.
 pub const REAL: &str = "real";
 
-/// The ways through a fetched scene in that suite.
+/// The paths through a fetched scene in that suite.
 pub const REAL_PATHS: &[&str] = &["flythrough:frames=128", "outside:frames=64"];
 
 impl Suite {
-    /// The suite of a name or a TOML file, with structures where that states none.
+    /// The suite of a name or a TOML file.
     ///
-    /// # Errors
-    /// An unknown name; a file that cannot be read or is no suite, with its line.
+    /// If given, `default` replaces the structures of a built-in suite, and of a file that names
+    /// none.
+    ///
+    /// # Errors An unknown name; a file that cannot be read or is not a suite, with its line.
     pub fn of(text: &str, default: Option<&str>) -> Result<Suite, InputError> {
         let mut suite = match text.ends_with(".toml") {
             true => return written(text, default),
@@ -74,7 +76,7 @@ impl Suite {
         Ok(suite)
     }
 
-    /// True if it comes with the program.
+    /// True if it is built in.
     pub fn is_built_in(&self) -> bool {
         !self.name.ends_with(".toml")
     }
@@ -148,7 +150,7 @@ mod tests {
 
     #[test]
     fn every_suite_names_what_exists_and_those_that_rank_have_the_real_scenes() {
-        // One is about growth, one about a change between two programs.
+        // One suite is about growth, one about a change between two programs.
         let ranks = |name: &str| !["growth", "compare"].contains(&name);
         for suite in SUITES.iter() {
             for row in &suite.scenes {

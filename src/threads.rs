@@ -1,17 +1,17 @@
 //! Distribution of work over threads, and the limit of their number.
 //!
-//! Builds share work among threads that they start; queries among [`Workers`], which stay.
-//! Callers define jobs and the order of results.
+//! Builds start threads to share work; queries use [`Workers`], which persist. Callers define jobs
+//! and the order of results.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
 
-/// Most threads of a pool: beyond it the system may give none.
+/// Most threads of a pool: the system may not create more.
 pub const MOST_THREADS: usize = 256;
 
-/// The threads that a build may use, and whether a build has asked for them.
+/// The threads that a build may use, and whether a build has used them.
 #[derive(Debug)]
 pub struct Pool {
     threads: usize,
@@ -31,20 +31,21 @@ impl Pool {
         self.threads
     }
 
-    /// Returns true if [`Pool::threads`] was called: otherwise a build is on one.
+    /// Returns true if [`Pool::threads`] was called: else a build is single-threaded.
     pub fn was_asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 }
 
-/// Does every job on `threads` threads, of which this is one: a free thread
-/// takes the next. With one thread, or one job, the jobs are done in order, here.
+/// Does every job on `threads` threads, this one included.
 ///
-/// If the system gives fewer threads, those do the work. A thread costs some
-/// 20 to 50 us to start: jobs are worth it from a fraction of a millisecond on.
+/// A free thread takes the next job. With one thread, or one job, the jobs are done in order on
+/// this thread.
 ///
-/// # Panics
-/// If a job does.
+/// If the system creates fewer threads, those do the work. Starting a thread takes about 20 to 50
+/// us: jobs pay from a fraction of a millisecond on.
+///
+/// # Panics If a job panics.
 pub fn share<J: Send>(
     threads: usize,
     jobs: impl Iterator<Item = J> + Send,
@@ -67,8 +68,7 @@ pub fn share<J: Send>(
 
 /// Results of jobs in their order, done as [`share`] does them.
 ///
-/// # Panics
-/// If a job does.
+/// # Panics If a job panics.
 pub fn map<J: Send, R: Send>(
     threads: usize,
     jobs: impl Iterator<Item = J> + Send,
@@ -84,7 +84,7 @@ pub fn map<J: Send, R: Send>(
     done.into_values().collect()
 }
 
-/// A function for every thread: it does job after job until there is none left.
+/// The loop of a thread: does job after job until none is left.
 fn queue<J>(jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) -> impl Fn() + Sync {
     let jobs = Mutex::new(jobs.fuse());
     move || {
@@ -95,7 +95,7 @@ fn queue<J>(jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) -> im
     }
 }
 
-/// Threads that stay between queries. The thread that shares work is one of them.
+/// Threads that persist between queries; the calling thread is one of them.
 pub struct Workers {
     others: rayon::ThreadPool,
     threads: usize,
@@ -104,8 +104,7 @@ pub struct Workers {
 impl Workers {
     /// At least 1, at most 256 threads.
     ///
-    /// # Errors
-    /// The system gives no more threads.
+    /// # Errors The system cannot create that many threads.
     pub fn new(threads: usize) -> Result<Workers, rayon::ThreadPoolBuildError> {
         let threads = threads.clamp(1, MOST_THREADS);
         let others = rayon::ThreadPoolBuilder::new().num_threads((threads - 1).max(1));
@@ -115,8 +114,7 @@ impl Workers {
 
     /// [`share`] among these threads, which start within microseconds.
     ///
-    /// # Panics
-    /// If a job does.
+    /// # Panics If a job panics.
     pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
         let most = jobs.size_hint().1.unwrap_or(usize::MAX);
         let work_off = queue(jobs, work);

@@ -1,7 +1,7 @@
-//! Laws of motion: the bounds of an item after it has moved a number of times.
+//! Laws of motion: the bounds of an item as a function of its number of moves.
 //!
-//! Pure functions of seed, item and number of moves: nothing accumulates, and a replay
-//! needs no state but that number.
+//! Pure functions of seed, item and number of moves: nothing accumulates, and a replay needs no
+//! other state.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -20,7 +20,7 @@ pub const REMOVED: Aabb = Aabb::new(Vec3::ONE, Vec3::NEG_ONE);
 /// Bounds of an item after a number of moves; `None` for an item that cannot move.
 pub(super) type Law = fn(&World, ItemId, u32) -> Option<Aabb>;
 
-/// The facts of a scene that laws read. Coordinates are the scene's own.
+/// The scene's properties that laws read, in its own coordinates.
 #[derive(Debug)]
 pub(super) struct World {
     start: Vec<Aabb>,
@@ -30,13 +30,13 @@ pub(super) struct World {
     mean: f64,
     up: UpAxis,
     origin: DVec3,
-    /// Streets of a scene that is generated as a city.
+    /// Streets of a scene that was generated as a city.
     city: Option<CityGrid>,
     step: f64,
     seed: u64,
 }
 
-/// Direction of the street that a place is in, z up and in world coordinates.
+/// Direction of the street at a position, z up and in world coordinates.
 fn street(grid: &CityGrid, place: DVec3) -> Option<DVec3> {
     let pitch = grid.block + grid.street;
     let is_across = |k: usize| (place[k] - grid.corner).rem_euclid(pitch) >= grid.block;
@@ -46,7 +46,7 @@ fn street(grid: &CityGrid, place: DVec3) -> Option<DVec3> {
     }
 }
 
-/// Streets of a scene that is generated as a city, in world coordinates.
+/// Streets of a scene that was generated as a city, in world coordinates.
 fn city_grid(scene: &Scene) -> Option<CityGrid> {
     let mut spec = Spec::parse(&scene.name).ok()?;
     // A file may have that name.
@@ -77,25 +77,25 @@ impl World {
         }
     }
 
-    /// Number `n` of an item, uniform in 0..1.
+    /// Random number `n` of an item, uniform in 0..1.
     fn unit(&self, id: ItemId, n: u64) -> f64 {
         let key = mix64(self.seed ^ mix64(u64::from(id) ^ (n << 32)));
         (key >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A direction of an item, uniform on the sphere.
+    /// Random direction of an item, uniform on the sphere.
     fn direction(&self, id: ItemId) -> DVec3 {
         let z = 2.0 * self.unit(id, 1) - 1.0;
         self.up.from_z_up(on_sphere(z, TAU * self.unit(id, 2)))
     }
 
-    /// Step of an item, in its own sizes.
+    /// Step length of an item, proportional to its size.
     fn step(&self, b: &Aabb) -> f64 {
         let own = longest(b);
         self.step * if own > 0.0 { own } else { self.mean }
     }
 
-    /// A box moved and scaled about its centre, reflected at the bounds of the scene.
+    /// A box translated, scaled about its centre, and reflected at the scene's bounds.
     fn placed(&self, b: &Aabb, offset: DVec3, scale: f64) -> Aabb {
         let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
         let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0 * scale);
@@ -106,7 +106,7 @@ impl World {
         Aabb::new(min.max(self.low).as_vec3(), max.min(self.high).as_vec3())
     }
 
-    /// The box at a random place, another one for each number `n`.
+    /// The box at a random position, a different one for each `n`.
     pub(super) fn anywhere(&self, id: ItemId, n: u32) -> Aabb {
         let b = &self.start[id as usize];
         let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
@@ -121,7 +121,7 @@ fn longest(b: &Aabb) -> f64 {
     (b.max.as_dvec3() - b.min.as_dvec3()).max_element()
 }
 
-/// A coordinate between two mirrors; the middle where there is no room.
+/// A coordinate reflected between two mirrors; the middle if there is no room.
 fn reflected(x: f64, low: f64, high: f64) -> f64 {
     if low >= high {
         return low / 2.0 + high / 2.0;
@@ -129,13 +129,13 @@ fn reflected(x: f64, low: f64, high: f64) -> f64 {
     low + to_and_fro(x - low, high - low)
 }
 
-/// A triangle wave of that height, rising from zero.
+/// A triangle wave of this height, rising from zero.
 fn to_and_fro(x: f64, height: f64) -> f64 {
     let turn = x.rem_euclid(2.0 * height);
     turn.min(2.0 * height - turn)
 }
 
-/// In a direction of its own, at another size.
+/// In the item's own direction, at another size.
 pub(super) fn straight(world: &World, id: ItemId, moves: u32, scale: f64) -> Option<Aabb> {
     let b = &world.start[id as usize];
     let offset = world.direction(id) * world.step(b) * f64::from(moves);
@@ -180,7 +180,7 @@ pub(super) fn growth(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
     Some(world.placed(&world.start[id as usize], DVec3::ZERO, scale))
 }
 
-/// Half of the movers begin with an odd number.
+/// Half of the movers start with an odd number.
 pub(super) fn spawn(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
     let turn = moves + u32::from(world.unit(id, 4) < 0.5);
     Some(match turn.is_multiple_of(2) {

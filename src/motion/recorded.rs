@@ -19,11 +19,11 @@ const COLUMNS: [&str; 8] = [
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) stored: Aabb,
-    /// NaN where the stored box is the very same.
+    /// The box as written; NaN if the stored box equals it.
     pub(super) written: WorldBox,
 }
 
-/// Frames one after another.
+/// Consecutive frames.
 #[derive(Default, Debug)]
 pub(super) struct Recorded {
     ids: Vec<ItemId>,
@@ -32,7 +32,7 @@ pub(super) struct Recorded {
     ends: Vec<usize>,
     /// Time of each frame, s.
     times: Vec<f64>,
-    /// Reach of a whole file of which these frames are a part.
+    /// Reach of the whole file that these frames are a part of.
     reach: Vec3,
 }
 
@@ -53,12 +53,12 @@ impl Recorded {
         (&self.ids[rows.clone()], &self.rows[rows])
     }
 
-    /// A frame for each time with all rows since the one before; the rows left over.
+    /// A frame for each time, with all rows since the previous one.
     ///
-    /// An item's last row counts.
+    /// The last row of an item counts. Returns the number of unused rows, too.
     pub(super) fn at<'t>(&self, times: impl Iterator<Item = &'t f64>) -> (Recorded, usize) {
         let (mut paced, mut next) = (Recorded::default(), 0);
-        // The margin of a frame depends on the file alone.
+        // The margin of a frame depends on the whole file.
         paced.reach = self.reach();
         for time in times {
             let first = next;
@@ -82,7 +82,7 @@ impl Recorded {
         reaches.fold(Vec3::ZERO, Vec3::max)
     }
 
-    /// Returns whether rows of the whole file that are in no frame widen the margin.
+    /// Returns whether rows of the file that are in no frame widen the margin.
     pub(super) fn is_widened(&self) -> bool {
         !self.reach.cmple(self.own_reach()).all()
     }
@@ -100,7 +100,7 @@ impl Recorded {
             for v in row.stored.bits().as_flattened() {
                 hash.update(v.to_le_bytes());
             }
-            // A file that f32 holds has the digest of its stored boxes.
+            // The digest of a file that f32 represents exactly is that of its stored boxes.
             let WorldBox { min, max } = row.written;
             let own = [min, max].into_iter().filter(|corner| !corner.is_nan());
             for v in own.flat_map(|corner| corner.to_array()) {
@@ -109,7 +109,7 @@ impl Recorded {
         }
     }
 
-    /// Ends a frame with what has moved in it.
+    /// Ends a frame; `moved` are its moves.
     fn end_frame(&mut self, moved: &BTreeMap<ItemId, Bounds>) {
         self.ids.extend(moved.keys());
         self.rows.extend(moved.values());
@@ -119,11 +119,10 @@ impl Recorded {
 
 /// Reads a motion CSV: `time_s,id,min_x,..,max_z`.
 ///
-/// Rows of one time are a frame; a row without bounds removes the item. Numbers are f64
-/// and are rounded outward to f32 about the scene's origin.
+/// Rows with the same time are a frame; a row without bounds removes the item. Numbers are f64 and
+/// are rounded outward to f32 relative to the scene's origin.
 ///
-/// # Errors
-/// The line of the first value that is no number, no box or no item of the scene; a time
+/// # Errors The line of the first value that is not a number, box or item of the scene; a time
 /// before the last one; an item twice at one time; a file without rows.
 pub(super) fn read_motion_csv(
     bytes: &[u8],

@@ -1,4 +1,4 @@
-//! Laws stay within the scene and repeat themselves; files are read or refused.
+//! Laws stay within the scene and are repeatable; files are read or refused.
 
 use super::*;
 use crate::path::read_cameras_csv;
@@ -61,7 +61,7 @@ fn every_motion_repeats_itself_and_stays_within_the_scene() {
     }
 }
 
-/// In the streets of the whole city, whatever is left out.
+/// In the streets of the whole city, whatever part of it is loaded.
 #[test]
 fn the_same_items_of_a_part_of_a_city_move() {
     let whole = scene("city:n=4000");
@@ -78,7 +78,7 @@ fn the_same_items_of_a_part_of_a_city_move() {
 #[test]
 fn a_step_is_as_long_as_it_says() {
     let scene = scene("uniform:n=300");
-    // A reflection makes it shorter, of few.
+    // Reflections shorten the moves of a few.
     let whole = |of: &str, scene: &Scene| {
         let motion = Motion::load(&format!("{of}:share=1,step=0.1,frames=1"), scene).unwrap();
         let (moved, boxes) = &frames(&motion, scene)[0];
@@ -155,7 +155,7 @@ fn recorded_rows_move_and_remove_items() {
     assert_eq!(all.len(), 2);
     assert_eq!((&all[0].0[..], &all[1].0[..]), (&[1, 3][..], &[1][..]));
     assert_eq!((all[0].1[1], all[0].1[3].max.z), (REMOVED, 10.0));
-    // Outward: 0.1 is not in f32.
+    // Outward: f32 cannot hold 0.1.
     assert!(f64::from(all[1].1[1].max.x) > 0.1);
     assert_eq!(all[1].1[0], scene.items[0]);
 }
@@ -186,7 +186,7 @@ fn frames_are_those_of_cameras_with_times() {
         let path = read_cameras_csv(csv.as_bytes(), "c.csv", &Default::default()).unwrap();
         let whole = recorded_motion(&text, &scene).reach();
         let motion = recorded_motion(&text, &scene).seen_by(&path, views);
-        // Whichever rows are seen, the margin is that of all.
+        // The margin is that of all rows, whichever are seen.
         assert_eq!(motion.reach(), whole);
         let again = recorded_motion(&text, &scene).seen_by(&path, views);
         assert_eq!(motion.digest(), again.seen_by(&path, views).digest());
@@ -206,11 +206,11 @@ fn frames_are_those_of_cameras_with_times() {
         assert_eq!(seen(times, 2), [(vec![1], 1.0), (vec![1, 2], 2.0)]);
     }
     assert_eq!(seen("0", 2), [(vec![1], 1.0)]);
-    // Without a time for each camera a frame is the rows of one time.
+    // Without a time for each camera a frame has the rows of one time.
     assert_eq!(seen("0  1", 1).len(), 4);
 }
 
-/// Boxes that f32 holds alike, written differently, are different truths.
+/// Boxes that are equal in f32 but written differently are different truths.
 #[test]
 fn files_of_other_truths_have_other_digests() {
     let scene = scene("uniform:n=5");

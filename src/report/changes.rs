@@ -1,8 +1,8 @@
-//! Cells compared with older ones, of two programs in turns or of two reports.
+//! Cells compared with older ones: of two alternating programs, or two reports.
 //!
-//! Programs are judged pair by pair; a report's cell by its times relative to the other structures
-//! of its group, process by process: what moves a whole process, and most of what tells two days
-//! apart, drops out.
+//! Programs are judged pair by pair. A report's cell is judged by its times relative to the other
+//! structures of its group, process by process: shifts of a whole process, and most differences
+//! between two days, cancel.
 
 use std::{fmt, slice};
 
@@ -16,12 +16,13 @@ use super::{Report, ReportCell};
 use crate::measure::{GroupKey, Machine, Status, Toolchain};
 use crate::statistics::{Change, Judgement, judge, judge_unpaired, median, trimmed_mean};
 
-/// Fewer other structures cannot tell which of them moved: the median of three
-/// stays where it is when one of them moves, that of two does not.
+/// Fewest other structures that show which of them moved.
+///
+/// The median of three is unchanged if one of them moves, that of two is not.
 const LEAST_OTHERS: usize = 3;
-/// Reason of a cell that has fewer others.
+/// Reason of a cell with fewer others.
 pub const FEW_OTHERS: &str = "under three other structures with as many processes in both reports";
-/// Fewer processes have no interval.
+/// Fewest processes that give an interval.
 const LEAST_PROCESSES: usize = 3;
 
 /// Source of the times of both sides.
@@ -30,17 +31,17 @@ pub enum Basis {
     /// Two stored reports.
     ///
     /// Per process, ln(time) of a structure minus the median of an odd number of the other
-    /// structures that both reports have in the group, each about its mean in the old report;
-    /// old and new by a test of unpaired samples. What moved everything at once is
+    /// structures that both reports have in the group, each about its mean in the old report; old
+    /// and new are compared by an unpaired test. Shifts of everything at once are
     /// [`Changes::common_shifts`].
     Reports,
-    /// Pairs of processes in turns: times as they are, by a paired test.
+    /// Alternating pairs of processes: times as they are, by a paired test.
     Pairs,
 }
 
 /// Compares cells with older ones by some metrics.
 ///
-/// The metrics are of [`JUDGED_METRICS`](super::JUDGED_METRICS) or are counters of work, with Holm's
+/// The metrics are of [`JUDGED_METRICS`](super::JUDGED_METRICS) or are work counters, with Holm's
 /// correction over the cells of a metric. `threshold` 0.05 is 5 %.
 pub fn changes(
     basis: Basis,
@@ -91,7 +92,7 @@ pub fn changes(
     found
 }
 
-/// The counters that differ, of those that both sides have.
+/// The counters that differ, among those that both sides have.
 fn work_changes((old, new): Pair) -> impl Iterator<Item = WorkChange> {
     COUNTERS.iter().filter_map(move |&counter| {
         let (was, is) = (old.value(counter)?, new.value(counter)?);
@@ -150,10 +151,11 @@ fn valued(pair: Pair, metric: &'static str) -> JudgedRow {
 /// ln(time) in each process, old and new.
 type Logs = [Vec<f64>; 2];
 
-/// ln(time) about its mean in the old report: what is left is how the processes
-/// differ, and how new differs from old. Medians over structures are taken of
-/// this; a median of the times as they are is one structure's, and another's as
-/// soon as one of them has moved past it.
+/// ln(time) about its mean in the old report.
+///
+/// It shows how the processes differ, and how new differs from old. Medians over structures are
+/// taken of these: a median of plain times is that of one structure, and jumps to another one's as
+/// soon as this moves past it.
 fn centred(logs: &Logs) -> Logs {
     let old = mean(&logs[0]);
     [0, 1].map(|side| logs[side].iter().map(|ln| ln - old).collect())
@@ -164,7 +166,7 @@ fn mean(logs: &[f64]) -> f64 {
     mean.or_else(|| median(logs)).unwrap_or_default()
 }
 
-/// Only what is above zero is a time.
+/// Only positive values are times.
 fn is_sound(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
@@ -173,18 +175,18 @@ fn logs((old, new): Pair, metric: &str) -> Option<Logs> {
     let of = |cell: &ReportCell| {
         let logs = cell.ln_ns(metric);
         let is_sound = !logs.is_empty() && logs.iter().all(|ln| ln.is_finite());
-        // Nothing is slower or faster among no items.
+        // Without items no structure is slower or faster.
         (is_sound && cell.scene.total_count > 0).then_some(logs)
     };
     Some([of(old)?, of(new)?])
 }
 
-/// A cell on its way to a verdict: its row and its times.
+/// A cell to be judged: its row and its times.
 type Candidate<'r> = (&'r mut JudgedRow, Logs);
 
-/// The pairs that have a figure of their own.
+/// The pairs with independent figures.
 ///
-/// Only what moves has frames, and paths of a scene share its build.
+/// Only motions have frames, and all paths of a scene share one build.
 fn of_metric<'r>(pairs: &[Pair<'r>], metric: &str) -> Vec<Pair<'r>> {
     let all = pairs.iter().copied();
     let times = |cell: &'r ReportCell| cell.times.by_process.get(metric);
@@ -211,7 +213,7 @@ fn by_metric(basis: Basis, pairs: &[Pair], metric: &'static str, threshold: f64)
             None => row.reason = Some(why_unmeasured(row.old, row.new)),
             Some(logs) => row.processes = logs.each_ref().map(Vec::len),
         }
-        // A build is not of cameras.
+        // A build does not depend on cameras.
         let differs = timed_otherwise(pair).filter(|_| own.is_some() && metric != "build_ms");
         if let Some(reason) = differs {
             (row.outcome, row.reason, own) = (Outcome::Different, Some(reason), None);
@@ -241,9 +243,9 @@ fn judge_reports(timed: Vec<Candidate>, threshold: f64) {
     }
 }
 
-/// The old time as it is, and the new one by the ratio of the pairs.
+/// Judges pairs: the old time as it is, the new one from the ratio of the pairs.
 ///
-/// Too few pairs leave a ratio, which decides nothing.
+/// Too few pairs give a ratio without a verdict.
 fn judge_pairs(timed: Vec<Candidate>, threshold: f64) {
     let differences = timed.iter().map(|(_, [old, new])| -> Vec<f64> {
         old.iter().zip(new).map(|(old, new)| new - old).collect()
@@ -269,9 +271,9 @@ fn conclude(row: &mut JudgedRow, judgement: Option<Judgement>) {
     row.outcome = change.unwrap_or(Outcome::Inconclusive);
 }
 
-/// The rows of one counter, which is exact, where a side has it.
+/// The rows of one counter, which is exact, if a side has it.
 ///
-/// Any growth by more than `threshold` is more work.
+/// Growth by more than `threshold` is more work.
 fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedRow> {
     let most = 1.0 + threshold;
     let rows = pairs.iter().map(|&pair| valued(pair, counter));
@@ -288,11 +290,11 @@ fn by_work(pairs: &[Pair], counter: &'static str, threshold: f64) -> Vec<JudgedR
     rows.collect()
 }
 
-/// ln(time) less what moved the median of the others, process by process;
-/// nothing with too few others.
+/// ln(time) minus the shift of the others' median, process by process.
 ///
-/// If the others are even in number, the one that moved farthest from the median of all does
-/// not count: the median of four moves with two of them, and of three that are left one has moved.
+/// Empty with too few others. If the number of others is even, the one that moved farthest from the
+/// median of all is dropped: the median of four moves with two of them, but of the remaining three
+/// only one has moved.
 fn relative(own: usize, timed: &[Candidate], centred: &[Logs]) -> Logs {
     let (row, logs) = &timed[own];
     let others = timed.iter().zip(centred).filter(|((other, _), _)| {
@@ -343,7 +345,7 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
 
 /// Medians over the groups of their medians over the structures.
 ///
-/// Then the groups that moved relative to it. Nothing without a cell that both have timed.
+/// Then the groups that moved relative to it. Empty without a cell that both have timed.
 fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<CommonShift> {
     let timed = pairs.iter().filter_map(|&pair| {
         let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
@@ -351,7 +353,7 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
         Some((pair.1.key().group, centred(&logs)))
     });
     let groups: Vec<(GroupKey, Vec<Logs>)> = grouped(timed);
-    // A cell that is missing in a process is paired with nothing.
+    // A cell that is missing in a process cannot be paired.
     let all = || groups.iter().flat_map(|group| &group.1);
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
     let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);
@@ -420,7 +422,7 @@ mod tests;
 /// A fact that differs.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Setting {
-    /// "machine", "toolchain" or "run"; between shards "program" or "plan" as well.
+    /// "machine", "toolchain" or "run"; between shards also "program" or "plan".
     pub of: &'static str,
     /// Name of the fact.
     pub what: &'static str,
@@ -428,7 +430,7 @@ pub struct Setting {
     pub old: String,
     /// Value in the new report.
     pub new: String,
-    /// True if it is another machine: absolute times do not compare.
+    /// True if it shows another machine: absolute times are not comparable.
     pub is_machine: bool,
 }
 
@@ -439,7 +441,7 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Whose, name, whether it tells two machines apart, and the fact itself.
+/// Owner, name, whether it distinguishes two machines, and the value.
 pub(super) type Fact = (&'static str, &'static str, bool, String);
 
 pub(super) fn known(fact: &Option<String>) -> String {
@@ -468,7 +470,7 @@ pub(super) fn facts(machine: &Machine, tools: &Toolchain) -> Vec<Fact> {
     ]
 }
 
-/// Differing facts of two lists of the same names, in their order.
+/// Differing facts of two lists with the same names, in their order.
 pub(super) fn differences(old: Vec<Fact>, new: Vec<Fact>) -> impl Iterator<Item = Setting> {
     let differing = old.into_iter().zip(new).filter(|(old, new)| old.3 != new.3);
     differing.map(|((of, what, is_machine, old), (.., new))| Setting {

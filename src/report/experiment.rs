@@ -1,4 +1,4 @@
-//! An experiment in the process of its caller: from names to a report.
+//! An experiment in the calling process: from names to a report.
 
 use std::collections::BTreeSet;
 use std::time::SystemTime;
@@ -55,8 +55,8 @@ pub struct Experiment {
 impl Experiment {
     /// An experiment on a scene: a file, a sample or a spec.
     ///
-    /// [`scene::load`] takes it. Frustum queries and region searches with warm caches, a
-    /// tenth of a second per structure and path.
+    /// Loaded by [`scene::load`]. Frustum queries and region searches with warm caches, a tenth of
+    /// a second per structure and path.
     ///
     /// [`scene::load`]: crate::scene::load
     pub fn new(scene: &str) -> Experiment {
@@ -85,7 +85,7 @@ impl Experiment {
 
     /// An experiment on a scene and a path in memory.
     ///
-    /// Otherwise as [`Experiment::new`].
+    /// Otherwise like [`Experiment::new`].
     pub fn of(scene: Scene, path: CameraPath) -> Experiment {
         let experiment = Experiment::new(&scene.name).path(&path.name);
         Experiment {
@@ -102,7 +102,7 @@ impl Experiment {
         self
     }
 
-    /// Adds structures, those of [`Registry::structures`] or others.
+    /// Adds structures, from [`Registry::structures`] or made otherwise.
     ///
     /// [`Registry::structures`]: crate::index::Registry::structures
     pub fn structures(mut self, structures: Vec<StructureSpec>) -> Experiment {
@@ -112,9 +112,8 @@ impl Experiment {
 
     /// Loads, builds, checks every answer, and times.
     ///
-    /// # Errors
-    /// A scene or a path that cannot be read or made, a camera without a view; a plan that
-    /// measures nothing, or that one process cannot measure.
+    /// # Errors A scene or a path that cannot be read or made, a camera without a view; a plan that
+    /// measures nothing, or that a single process cannot measure.
     pub fn run(&self) -> Result<Report, ExperimentError> {
         self.check()?;
         let started_at = utc(SystemTime::now());
@@ -146,13 +145,13 @@ impl Experiment {
         Ok(stream.report())
     }
 
-    /// Checks that the plan has one or more of everything, and usable numbers.
+    /// Checks that no part of the plan is empty, and that its numbers are usable.
     fn check(&self) -> Result<(), ExperimentError> {
         let (plan, effort) = (&self.plan, &self.plan.effort);
         let (scenes, [least, most]) = (&plan.scenes, effort.rounds);
         let labels: BTreeSet<_> = plan.structures.iter().map(|s| &s.label).collect();
         let is_time = |ns: f64| (0.0..f64::INFINITY).contains(&ns);
-        // What is named twice would count as two processes.
+        // A name given twice would count as two processes.
         let once = |names: Vec<&String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
         let sources = scenes.iter().map(|s| &s.source);
         let has_each_once = |s: &PlannedScene| once(s.paths.iter().collect());

@@ -1,8 +1,8 @@
 //! The folder of a run.
 //!
-//! stream.jsonl and samples.csv are appended to as the run continues; report.json and
-//! summary.csv are made of them at its end. Those are written beside their place and renamed
-//! into it, so that a reader or a crash never meets half a file.
+//! stream.jsonl and samples.csv are appended to during the run; report.json and summary.csv are
+//! made from them at its end. Those two are written under temporary names and renamed, so that
+//! readers and crashes never leave half a file.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -27,22 +27,21 @@ use crate::shown::lines;
 pub struct RunFolder {
     /// The folder that is written to.
     pub path: PathBuf,
-    /// Locked for as long as it is open.
+    /// Holds the lock as long as it is open.
     stream: File,
     samples: File,
 }
 
 impl RunFolder {
-    /// Makes the folder of a new run.
+    /// Creates the folder of a new run.
     ///
-    /// # Errors
-    /// An error if it holds a file of a run already.
+    /// # Errors The folder contains a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, InputError> {
         let io = writing::io(path);
         let is_new = !path.exists();
         fs::create_dir_all(path).map_err(io)?;
         refuse_taken(path)?;
-        // There is no stream without its first line: it gets its name with it.
+        // The stream gets its name together with its first line.
         let begin = || -> io::Result<NamedTempFile> {
             let (mut stream, is_locked) = locked_temporary_in(path)?;
             stream.write_all(&Line::Run(header).to_json()?)?;
@@ -73,7 +72,7 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// No samples yet: the names of the columns.
+    /// Resets the samples to the line of column names.
     fn begin_samples(&mut self) -> Result<(), InputError> {
         let mut write = || {
             self.samples.set_len(0)?;
@@ -84,8 +83,7 @@ impl RunFolder {
 
     /// Appends a line, whole or not at all as far as a reader can tell.
     ///
-    /// # Errors
-    /// I/O errors.
+    /// # Errors I/O errors.
     pub fn append(&mut self, line: Line) -> Result<(), InputError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
         written.map_err(writing::io(&self.path.join(STREAM)))
@@ -126,40 +124,38 @@ impl RunFolder {
         Ok(kept)
     }
 
-    /// Takes the folder away again: for a run that ended before its first part.
+    /// Removes the folder of a run that ended before its first part.
     pub fn discard(self) {
         for name in [STREAM, SAMPLES] {
             let _ = fs::remove_file(self.path.join(name));
         }
-        // Only if nothing else is in it.
+        // Fails if the folder has other files.
         let _ = fs::remove_dir(&self.path);
     }
 }
 
-/// Longest wait for the lock of a run: a worker that was just started by a
-/// killed run holds it until it is a program of its own.
+/// Longest wait for the lock of a run.
+///
+/// A worker just started by a killed run holds the lock until it has executed its program.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The folder of a run that was stopped: locked, and as it was left.
+/// The folder of a stopped run: locked, and otherwise unchanged.
 pub struct StoppedRun {
-    /// The folder that is read from.
+    /// The folder that is read.
     pub path: PathBuf,
-    /// Parts whose samples are gone, to be measured again.
+    /// Number of parts whose samples are missing, to be measured again.
     pub lost: usize,
     stream: File,
-    /// Length of the stream, as far as it is whole and has its samples.
+    /// Length of the stream up to the last complete line with its samples.
     length: u64,
 }
 
 impl StoppedRun {
-    /// Opens the folder of a stopped run, with what its stream holds.
+    /// Opens the folder of a stopped run, with the contents of its stream.
     ///
-    /// Half a line at its end is none, and parts whose samples are gone are to be measured
-    /// again.
+    /// An incomplete last line is ignored, and parts whose samples are missing are measured again.
     ///
-    /// # Errors
-    /// No stream, not a stream, another schema version, or another process at
-    /// work in it.
+    /// # Errors No stream, not a stream, another schema version, or another process writing there.
     pub fn open(path: &Path) -> Result<(StoppedRun, Stream), InputError> {
         let file = path.join(STREAM);
         let io = writing::io(&file);
@@ -198,10 +194,9 @@ impl StoppedRun {
         Ok((stopped, stream))
     }
 
-    /// Cuts off what is not whole, to be appended to.
+    /// Truncates stream and samples to their complete part, to append to them.
     ///
-    /// # Errors
-    /// I/O errors.
+    /// # Errors I/O errors.
     pub fn go_on(self, stream: &Stream) -> Result<RunFolder, InputError> {
         let mut folder = RunFolder {
             samples: open(&self.path.join(SAMPLES))?,
@@ -220,13 +215,12 @@ impl StoppedRun {
     }
 }
 
-/// Refuses a folder that holds a file of a run.
+/// Refuses a folder that contains a file of a run.
 ///
-/// # Errors
-/// An error that names the folder.
+/// # Errors An error that names the folder.
 pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
     let files = [REPORT, SUMMARY, SAMPLES, STREAM, PAGE];
-    // A link that leads nowhere is one too.
+    // A dangling link counts too.
     let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
     match files.into_iter().any(is_there) {
         true => Err(writing::taken(path)),
@@ -234,8 +228,9 @@ pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
     }
 }
 
-/// Opens a file to append to, made if it is not there. A link is refused: what it
-/// leads to is not the run's.
+/// Opens or creates a file to append to.
+///
+/// A link is refused: its target is not the run's.
 fn open(file: &Path) -> Result<File, InputError> {
     if fs::symlink_metadata(file).is_ok_and(|found| !found.is_file()) {
         let found = io::Error::other("a link or a device; expected a file of the run's own");
@@ -246,11 +241,11 @@ fn open(file: &Path) -> Result<File, InputError> {
     options.open(file).map_err(writing::io(file))
 }
 
-/// Bytes of samples.csv up to the first NUL; none without its first line.
+/// Bytes of samples.csv up to the first NUL; 0 without its first line.
 ///
-/// A power cut leaves NULs where data never reached the disk.
+/// A power cut leaves NULs for data that never reached the disk.
 pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
-    // A pipe would wait for its writer.
+    // Opening a pipe would wait for its writer.
     if !fs::metadata(file)?.is_file() {
         return Ok(0);
     }
@@ -259,7 +254,7 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
     if reader.read_exact(&mut head).is_err() || head != *SAMPLE_COLUMNS.as_bytes() {
         return Ok(0);
     }
-    // A NUL of our own ends a file without one.
+    // An appended NUL ends a file that has none.
     let sound = reader.chain(&b"\0"[..]).skip_until(0)? - 1;
     Ok((head.len() + sound) as u64)
 }
@@ -268,8 +263,7 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
 ///
 /// A picture is its name without `.svg`, and its contents.
 ///
-/// # Errors
-/// Errors of the file system.
+/// # Errors I/O errors.
 pub fn save_page(
     folder: &Path,
     page: &str,
@@ -298,9 +292,9 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), InputError> {
     })
 }
 
-/// Columns of summary.csv before and behind those of the metrics.
+/// Columns of summary.csv before and after those of the metrics.
 ///
-/// `name=field`, with `/` before a field of a field, or the name of the field alone.
+/// `name=field`, with `/` between a field and its subfield, or the name of the field alone.
 const COLUMNS: [&str; 2] = [
     "scene=scene/name path=path/name cache=path/cache structure test arithmetic=path/arithmetic \
      planes=path/planes epsilon=path/epsilon status reason rank processes=times/processes \
@@ -318,10 +312,10 @@ const COLUMNS: [&str; 2] = [
      views_per_frame=path/views_per_frame chose skipped_items=scene/skipped_items",
 ];
 
-/// The metrics whose intervals summary.csv has.
+/// The metrics whose intervals are in summary.csv.
 const WITH_INTERVALS: &str = "query_ns speedup times_read times_memcpy locate_ns build_ms frame_ns";
 
-/// Names of the columns of summary.csv, and the places of their fields in a cell.
+/// Names of the columns of summary.csv, and the paths of their fields in a cell.
 fn columns() -> Vec<[String; 2]> {
     let [before, behind] = COLUMNS.map(|columns| {
         let columns = columns.split(' ');
@@ -340,7 +334,7 @@ fn columns() -> Vec<[String; 2]> {
     all
 }
 
-/// Text of a field; empty without one.
+/// Text of a field; empty if it is missing.
 fn text(field: Option<&Value>) -> String {
     match field {
         None | Some(Value::Null) => String::new(),
@@ -352,7 +346,7 @@ fn text(field: Option<&Value>) -> String {
     }
 }
 
-/// One tidy row per cell; a metric that was not measured is an empty field.
+/// One tidy row per cell; the field of a metric that was not measured is empty.
 fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
     let (mut csv, columns) = (csv::Writer::from_writer(out), columns());
     csv.write_record(columns.iter().map(|[name, _]| name))?;

@@ -1,6 +1,6 @@
 //! Outcome of one cell between an old measurement and a new one.
 //!
-//! Measurements are two reports, or two programs that ran in turns. One row type for both, the
+//! Measurements are two reports, or alternating runs of two programs. One row type for both, the
 //! metrics that may be judged, and the counters that are compared exactly.
 
 use std::cmp::Ordering;
@@ -10,9 +10,9 @@ use serde::Serialize;
 use crate::measure::{CellKey, GroupKey, Status};
 use crate::statistics::{Change, Judgement};
 
-/// The metrics with a value per process, which a judgement needs; less is better.
+/// The metrics with a value per process, as judging requires; less is better.
 ///
-/// The first is the one that structures are ranked by.
+/// Structures are ranked by the first one.
 pub static JUDGED_METRICS: &[&str] = &[
     "query_ns",
     "locate_ns",
@@ -45,26 +45,26 @@ named! {
     #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Outcome {
-        /// Was right and is wrong, unsafe or panics.
+        /// The right answer is now wrong or unsafe, or the structure panics.
         Broken = "broken",
-        /// Was right and is not answered any more.
+        /// The right answer is missing now.
         Lost = "lost",
-        /// Takes longer: proven, and by more than the comparison's floor.
+        /// Takes longer: proven to exceed the comparison's floor.
         Slower = "slower",
         /// Tests more nodes, items or planes, by more than the threshold.
         MoreWork = "more_work",
         /// Not the same question, or another answer: times of stored runs are not judged.
         Different = "different",
-        /// No time above zero on one side at least: not judged.
+        /// No positive time on at least one side: not judged.
         #[default]
         Unmeasured = "unmeasured",
         /// Right in neither report: not judged.
         FailedInBoth = "failed_in_both",
-        /// Was not right and is.
+        /// The answer was not right and is now.
         Gained = "gained",
         /// Neither a change nor its absence is proven.
         Inconclusive = "inconclusive",
-        /// Takes less time: proven, and by more than the floor.
+        /// Takes less time: proven to exceed the floor.
         Faster = "faster",
         /// Tests fewer nodes, items or planes, by more than the threshold.
         LessWork = "less_work",
@@ -74,14 +74,14 @@ named! {
 }
 
 impl Outcome {
-    /// Outcome from statuses alone; `None` where both are ok and times decide.
+    /// Outcome from statuses alone; `None` if both are ok and times decide.
     pub fn of_statuses(old: Status, new: Status) -> Option<Outcome> {
         match (old == Status::Ok, new == Status::Ok) {
             (true, true) => None,
             (true, false) if new.is_failure() => Some(Outcome::Broken),
             (true, false) => Some(Outcome::Lost),
             (false, true) => Some(Outcome::Gained),
-            // Never asked, and so no failure.
+            // Never queried, so not a failure.
             (false, false) if old == Status::LeftOut && new == old => Some(Outcome::Unmeasured),
             (false, false) => Some(Outcome::FailedInBoth),
         }
@@ -104,30 +104,30 @@ impl From<Change> for Outcome {
     }
 }
 
-/// A cell of a comparison, by one metric or as a whole.
+/// A cell of a comparison, for one metric or as a whole.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
 pub struct JudgedRow {
-    /// Slower, faster, same, or why it cannot be said.
+    /// Slower, faster, same, or why there is no verdict.
     #[serde(rename = "verdict")]
     pub outcome: Outcome,
     /// The cell in both reports.
     #[serde(flatten)]
     pub cell: CellKey,
-    /// `None` where the cell failed or was not the same question.
+    /// `None` if the cell failed or was not the same query.
     pub metric: Option<&'static str>,
-    /// The shown value on each side, in the unit of the metric.
+    /// The reported value on the old side, in the unit of the metric.
     pub old: Option<f64>,
-    /// The shown value on the new side.
+    /// The reported value on the new side.
     pub new: Option<f64>,
-    /// Change, interval and resolution; `None` where nothing was judged.
+    /// Change, interval and resolution; `None` if nothing was judged.
     pub judgement: Option<Judgement>,
-    /// Processes with a time on each side; of pairs: the same number twice.
+    /// Processes with a time on each side; for pairs, the same number twice.
     pub processes: [usize; 2],
-    /// How the cell ended in the old report.
+    /// Status of the cell in the old report.
     pub old_status: Status,
-    /// How the cell ended in the new report.
+    /// Status of the cell in the new report.
     pub new_status: Status,
-    /// Why the verdict is what it is, where the figures do not say it.
+    /// Reason for the verdict, unless the figures show it.
     pub reason: Option<String>,
     /// Judged samples of pairs of processes: ln ns per query, old and new.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -135,7 +135,7 @@ pub struct JudgedRow {
 }
 
 impl JudgedRow {
-    /// new / old, as judged or of the work.
+    /// new / old, as judged, or of the work.
     pub fn ratio(&self) -> Option<f64> {
         let is_work = self.metric.is_some_and(|metric| WORK.contains(&metric));
         let values = self.old.zip(self.new).filter(|_| is_work);
@@ -145,8 +145,7 @@ impl JudgedRow {
 
     /// Returns true if the row is worth reading.
     ///
-    /// Not the same as before, not a metric that neither side ever had, not a failure as
-    /// before.
+    /// Not unchanged, not a metric that neither side ever had, not the same failure as before.
     pub fn is_news(&self) -> bool {
         match self.outcome {
             Outcome::Same => false,
@@ -158,7 +157,7 @@ impl JudgedRow {
         }
     }
 
-    /// Worst first; among the faster ones the one that gained most.
+    /// Worst first; among faster ones the one with the largest gain.
     pub fn order(&self, other: &JudgedRow) -> Ordering {
         let ratio = |row: &JudgedRow| row.ratio().unwrap_or(1.0);
         let by_ratio = match self.outcome {
@@ -169,13 +168,13 @@ impl JudgedRow {
     }
 }
 
-/// A counter that is not what it was.
+/// A counter that has changed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct WorkChange {
     /// The cell in both reports.
     #[serde(flatten)]
     pub cell: CellKey,
-    /// Name of the metric, `items_tested`.
+    /// Name of the metric, such as `items_tested`.
     pub counter: &'static str,
     /// Value in the old report.
     pub old: f64,
@@ -189,47 +188,47 @@ pub struct Lone {
     /// The cell in the report that has it.
     #[serde(flatten)]
     pub cell: CellKey,
-    /// How it ended.
+    /// Its status.
     pub status: Status,
-    /// Why, where it did not end well.
+    /// Reason, unless the status is ok.
     pub reason: Option<String>,
 }
 
 /// Shift of all structures at once: the machine, or the program as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CommonShift {
-    /// The only group that it is of, relative to the others.
+    /// The only group concerned, relative to the others; `None` for all.
     pub group: Option<GroupKey>,
     /// Metric whose times are compared.
     pub metric: &'static str,
     /// new / old: above 1 is slower.
     pub ratio: f64,
-    /// 95 % interval; `None` below three processes a side.
+    /// 95 % interval; `None` below three processes per side.
     pub lower: Option<f64>,
     /// Upper end of the interval.
     pub upper: Option<f64>,
-    /// Cells it is made of.
+    /// Number of cells it is computed from.
     pub cells: usize,
 }
 
-/// A comparison: every cell with its verdict, and what else is to be said.
+/// A comparison: every cell with its verdict, and further differences.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
 pub struct Changes {
-    /// 0.05 is 5 %: how finely "same" is to be shown.
+    /// Precision required for "same"; 0.05 is 5 %.
     pub threshold: f64,
     /// Cells that both reports have.
     pub cells_in_common: usize,
-    /// Worst first.
+    /// Judged rows, worst first.
     pub rows: Vec<JudgedRow>,
-    /// Differences of what was counted: exact, and no verdict.
+    /// Differences of counters: exact, without a verdict.
     pub work_changed: Vec<WorkChange>,
     /// Cells that only the old report has.
     pub only_in_old: Vec<Lone>,
     /// Cells that only the new report has.
     pub only_in_new: Vec<Lone>,
-    /// Shifts of each metric between two reports; none of programs that ran in turns.
+    /// Shifts of each metric between two reports; empty for alternating programs.
     ///
-    /// First of all groups, then of each that is proven to have moved relative to the others.
+    /// First that of all groups, then of each group proven to have moved relative to the others.
     pub common_shifts: Vec<CommonShift>,
 }
 
@@ -248,29 +247,29 @@ impl Changes {
         self.common_shifts.iter().filter(is_beyond).collect()
     }
 
-    /// Returns true if NEW holds a wrong answer, with or without a partner in OLD.
+    /// Returns true if NEW has a wrong answer, with or without a counterpart in OLD.
     pub fn is_wrong(&self) -> bool {
         let paired = self.rows.iter().map(|row| row.new_status);
         let alone = self.only_in_new.iter().map(|cell| cell.status);
         paired.chain(alone).any(Status::is_failure)
     }
 
-    /// Returns true if a right answer takes longer or more work or is no longer given.
+    /// Returns true if a right answer takes longer or more work or is missing now.
     pub fn is_regression(&self) -> bool {
         let worse = [Outcome::Slower, Outcome::MoreWork, Outcome::Lost];
         self.rows.iter().any(|row| worse.contains(&row.outcome))
     }
 
-    /// Returns true if no row at all could be judged, and nothing is wrong.
+    /// Returns true if no row could be judged, and nothing is wrong.
     pub fn judges_nothing(&self) -> bool {
         use Outcome::{Different, FailedInBoth, Unmeasured};
         let mut outcomes = self.rows.iter().map(|row| row.outcome);
         outcomes.all(|o| matches!(o, Different | Unmeasured | FailedInBoth)) && !self.is_wrong()
     }
 
-    /// More processes or pairs that would decide all inconclusive cells.
+    /// Number of further processes or pairs that would decide all inconclusive cells.
     ///
-    /// The most that one of them needs, if it is known.
+    /// The largest number that one of them needs, if known.
     pub fn more_pairs(&self) -> Option<usize> {
         let judged = self.rows.iter().filter_map(|row| row.judgement);
         judged.filter_map(|found| found.more_pairs).max()

@@ -1,7 +1,6 @@
-//! Joining the shards of one plan into the run that they are together.
+//! Joins the shards of one plan into a single run.
 //!
-//! Shards that must not be mixed are refused by name, and the groups come in the order of the
-//! whole plan.
+//! Shards that must not be mixed are refused by name; groups are in the order of the whole plan.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -16,21 +15,20 @@ use crate::input::InputError;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
 
-/// Shards that belong together, joined but not written.
+/// Shards of one run, joined but not written.
 pub struct Merged {
     /// The stream of the whole run.
     pub stream: Stream,
-    /// Per part: the file of its samples, and their range in bytes.
+    /// Per part: the file of its samples, and their byte range.
     samples: Vec<(PathBuf, [u64; 2])>,
 }
 
 /// Joins the folders of shards.
 ///
-/// `line` has the options that the shards have in common, and the command that they make;
-/// the caller compares them.
+/// `line` has the options that the shards have in common, and their joint command; the caller
+/// compares them.
 ///
-/// # Errors
-/// No shard or an unfinished one; another seed, suite, structure, machine, build or
+/// # Errors No shard or an unfinished one; another seed, suite, structure, machine, build or
 /// source; a cell in two shards, a group in none.
 pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, InputError> {
     let mut shards = Vec::new();
@@ -81,7 +79,7 @@ pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, Inp
             return Err(writing::at(&file, why));
         }
     }
-    // The order of one run: process by process, scene by scene.
+    // The order of a single run: process by process, scene by scene.
     let place = |key: &GroupKey| whole.iter().position(|other| other == key);
     let scene = |key: &GroupKey| whole.iter().position(|other| other.scene == key.scene);
     parts.sort_by_key(|(kept, _)| {
@@ -110,12 +108,11 @@ pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, Inp
 impl Merged {
     /// Writes the four files of a run into a folder that is new or empty.
     ///
-    /// They are written beside it and renamed, into an empty folder the stream last, so that
-    /// nothing that ends it leaves half a run.
+    /// They are written to a temporary folder and renamed, in an empty folder the stream last, so
+    /// that an interruption leaves no partial run.
     ///
-    /// # Errors
-    /// A folder that holds a run or other files; errors of the file system and of `check`,
-    /// which comes before every long step.
+    /// # Errors A folder that contains a run or other files; errors of the file system and of
+    /// `check`, which is called before every long step.
     pub fn write(&self, out: &Path, check: &dyn Fn() -> io::Result<()>) -> Result<(), InputError> {
         let io = writing::io(out);
         folder::refuse_taken(out)?;
@@ -140,7 +137,8 @@ impl Merged {
         save_report(beside.path(), &self.stream.report())?;
         check().map_err(io)?;
         if out.exists() {
-            // Of a folder that a shell may be in, which stays; the stream makes it a run.
+            // An existing folder, possibly a shell's working directory, is kept; the stream makes
+            // it a run.
             let listed = fs::read_dir(beside.path()).map_err(io)?;
             let listed: io::Result<Vec<_>> = listed.map(|file| Ok(file?.file_name())).collect();
             let mut names = listed.map_err(io)?;
@@ -169,7 +167,7 @@ impl Merged {
     }
 }
 
-/// Why a shard is not one of the same plan, from the same machine and build.
+/// The reason why a shard is not of the same plan, machine and build.
 fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
     let first = first.display();
     let told = |differs| format!("{differs} in {first}; expected the same in all shards");
@@ -179,8 +177,7 @@ fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
     differs.or_else(|| (begin.whole() != own.whole()).then(other))
 }
 
-/// The cell that two shards have in common, or the scene that is not the same
-/// under one name.
+/// A cell that two shards share, or a scene that differs under one name.
 fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<String> {
     let first = first.display();
     let mut groups = own.header.groups.iter();
@@ -190,7 +187,7 @@ fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<Strin
             "{pair} is in {first} as well; expected every cell in one shard"
         ));
     }
-    // One that could not be looked at has no digest.
+    // A scene that could not be loaded has no digest.
     let scenes = |stream: &'s Stream| {
         let parts = stream.parts.iter().map(|kept| &kept.part);
         let known = parts.filter(|part| !part.scene.digest.is_empty());
@@ -205,10 +202,10 @@ fn overlap<'s>(own: &'s Stream, other: &'s Stream, first: &Path) -> Option<Strin
     ))
 }
 
-/// Missing scenes and paths that a message names.
+/// Most missing scenes and paths that a message names.
 const NAMED: usize = 4;
 
-/// The header of the run that the shards are together.
+/// The header of the joint run of the shards.
 fn joined(shards: &[&Stream], (args, command): (&[String], &str)) -> Header {
     let headers = || shards.iter().map(|stream| &stream.header);
     let mut header = shards[0].header.clone();

@@ -1,7 +1,7 @@
 //! Reports: the model that other tools read, and the folder of a run.
 //!
 //! The model is versioned; in the folder every finished cell is on disk before the next begins.
-//! Also what can be read off a report. Defines the formats; the figures come from `measure`.
+//! Also evaluations of a report. Defines the formats; the figures come from `measure`.
 
 mod changes;
 mod experiment;

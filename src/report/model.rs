@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::measure::{Machine, ReportCell, Source, Status, Toolchain, TwinEntry};
 
-/// Raised when a field changes its meaning or goes away.
+/// Raised when a field changes its meaning or is removed.
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// The contents of report.json: a run, what it ran on, and its cells.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
-    /// Raised when a field changes its meaning or goes away.
+    /// Raised when a field changes its meaning or is removed.
     pub schema_version: u32,
     /// The command and when it ran.
     pub run: RunInfo,
@@ -25,19 +25,19 @@ pub struct Report {
     pub toolchain: Toolchain,
     /// Version and commit of the program.
     pub source: Source,
-    /// How far two measurements of the same thing lay apart.
+    /// Differences between repeated measurements of the same thing.
     pub noise: Noise,
     /// Structures, by scene, path and test.
     pub cells: Vec<ReportCell>,
     /// Lower bounds, measured in the same rounds as the cells of their scene and path.
     ///
-    /// No structures, never ranked, and therefore a list of their own.
+    /// Not structures and never ranked, therefore a separate list.
     #[serde(default)]
     pub bounds: Vec<ReportCell>,
 }
 
 impl Report {
-    /// Doubts about cameras, each once.
+    /// Warnings about cameras, each once.
     pub fn input_warnings(&self) -> BTreeSet<&String> {
         let cells = self.cells.iter();
         cells.flat_map(|cell| &cell.path.warnings).collect()
@@ -63,26 +63,26 @@ pub struct RunInfo {
     pub started_at: String,
     /// Null while the run continues, and for a run that was stopped.
     pub finished_at: Option<String>,
-    /// The command line, blanks between arguments.
+    /// The command line, arguments separated by blanks.
     pub command: String,
     /// Seed of the order in which structures are measured.
     pub seed: u64,
     /// Name of the suite; null for scenes and paths chosen by hand.
     pub suite: Option<String>,
-    /// The generator behind generated scenes and paths.
+    /// The random generator of scenes and paths.
     pub generator: String,
-    /// Processes that the rounds were spread over, as planned.
+    /// Planned number of processes that share the rounds.
     #[serde(default = "one")]
     pub processes: u32,
-    /// Threads of a build, and of views that are shared.
+    /// Threads of a build, and of views that share threads.
     #[serde(default = "one")]
     pub threads: u32,
-    /// `i/n` where only a share of the plan was run.
+    /// `i/n` if only a shard of the plan was run.
     pub shard: Option<String>,
-    /// Scenes and paths of the plan that nothing was measured of.
+    /// Scenes and paths of the plan without any measurement.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
-    /// Scenes of the suite that are not in the plan, and why; null for a whole suite.
+    /// Omitted scenes of the suite, and the reason; null for a whole suite.
     #[serde(default)]
     pub left_out: Option<String>,
 }
@@ -91,7 +91,7 @@ fn one() -> u32 {
     1
 }
 
-/// How far apart two measurements of the same thing lie in this run.
+/// Differences between repeated measurements of the same thing in this run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Noise {
@@ -99,9 +99,9 @@ pub struct Noise {
     pub aa_ratio: Option<f64>,
     /// The twin ratio of each scene and path.
     ///
-    /// A check that its interval holds 1. Nothing is derived from it.
+    /// Checked for intervals that contain 1; nothing is derived from it.
     pub twins: Vec<TwinEntry>,
-    /// Causes of noisy times, as far as the run noticed them, with advice.
+    /// Causes of noisy times that the run noticed, with advice.
     #[serde(default)]
     pub warnings: Vec<String>,
 }
@@ -110,7 +110,7 @@ pub struct Noise {
 mod tests {
     use super::*;
 
-    /// `UPDATE_SCHEMA=1 cargo test schema` writes the file again.
+    /// `UPDATE_SCHEMA=1 cargo test schema` writes the file.
     #[test]
     fn the_committed_schema_is_the_one_of_the_code() {
         let schema = schemars::schema_for!(Report);

@@ -1,7 +1,7 @@
-//! Cells of reports that belong together.
+//! Related cells of reports.
 //!
-//! Groups of cells with the same question, in the order of their ranks, which are the
-//! run's own; structures over several groups; cells of two reports with the same key.
+//! Groups of cells for the same queries, in the order of the run's ranks; structures over several
+//! groups; cells of two reports with the same key.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +12,9 @@ use crate::statistics::{ALPHA, Estimate, geometric_mean, is_less, speedup};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
-    /// Fastest first; what failed comes last, without a rank.
+    /// Fastest first; failed ones last, without a rank.
     pub cells: Vec<&'r ReportCell>,
-    /// Measured beside them, in the order of the table of bounds.
+    /// Bounds measured in the same rounds, in the order of their table.
     pub bounds: Vec<&'r ReportCell>,
 }
 
@@ -29,9 +29,9 @@ pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
     grouped(cells).into_iter().map(comparison).collect()
 }
 
-/// Takes the ranks of cells that may not be compared by their times.
+/// Removes the ranks of cells that must not be compared by their times.
 ///
-/// Those without a time, and those among no items, where nothing is found faster.
+/// Those without a time, and those of scenes without items, where nothing is found faster.
 pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
     for cell in cells {
         let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
@@ -41,8 +41,9 @@ pub(super) fn without_false_ranks(cells: &mut [ReportCell]) {
     }
 }
 
-/// Cells in the order of the ranks from the run, the faster first within a
-/// rank; those without a rank come last.
+/// Cells in the order of their ranks, the faster first within a rank.
+///
+/// Those without a rank come last.
 fn ranked(mut cells: Vec<&ReportCell>) -> Vec<&ReportCell> {
     let time = |cell: &ReportCell| {
         let time = cell.rank.and_then(|_| cell.time());
@@ -54,12 +55,12 @@ fn ranked(mut cells: Vec<&ReportCell>) -> Vec<&ReportCell> {
 }
 
 impl<'r> Comparison<'r> {
-    /// Any of its cells: scene, path and test are the same in all.
+    /// Any of its cells: scene, path and test are common to all.
     pub fn about(&self) -> &'r ReportCell {
         self.cells[0]
     }
 
-    /// Those of the first rank: the fastest and what ties with it.
+    /// The cells of the first rank: the fastest and its ties.
     pub fn winners(&self) -> impl Iterator<Item = &'r ReportCell> {
         self.sound().filter(|cell| cell.rank == Some(1))
     }
@@ -69,7 +70,7 @@ impl<'r> Comparison<'r> {
         self.of_any("visible_count") == Some(0.0)
     }
 
-    /// Returns true if its ranks tell anything.
+    /// Returns true if its ranks are informative.
     ///
     /// The fastest of empty answers is no advice.
     pub fn decides(&self) -> bool {
@@ -97,13 +98,13 @@ impl<'r> Comparison<'r> {
         let base = self.sound_cell(base)?;
         let value = times_as_fast(base, cell)?;
         let [logs, own] = [base, cell].map(|cell| cell.ln_ns(cell.ranked_by()));
-        // About the ratio of the two shown values.
+        // Centred on the ratio of the two reported values.
         let found = speedup(&logs, &own).map(|found| found.per(found.value / value));
         let exact = Estimate::exact(value);
         Some(found.map_or(exact, |found| Estimate { value, ..found }))
     }
 
-    /// The fastest structure of another crate whose answers are right.
+    /// The fastest structure of another crate with right answers.
     pub fn fastest_peer(&self) -> Option<&'r ReportCell> {
         let mut sound = self.sound();
         sound.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
@@ -115,17 +116,17 @@ impl<'r> Comparison<'r> {
         timed.map(move |cell| of(cell))
     }
 
-    /// How the answers differ from the truth: all that are right do alike.
+    /// Errors of the answers against the truth, common to all right ones.
     pub fn judged(&self) -> Option<&'r Judged> {
         self.cells.iter().find_map(|cell| cell.error.as_ref())
     }
 
-    /// A metric that is the same in all cells, from the first that has it.
+    /// A metric common to all cells, from the first that has it.
     pub fn of_any(&self, metric: &str) -> Option<f64> {
         self.metric_of_any(metric).map(|metric| metric.value)
     }
 
-    /// The same with its interval.
+    /// The metric with its interval.
     pub fn metric_of_any(&self, metric: &str) -> Option<&'r Metric> {
         self.cells.iter().find_map(|cell| cell.metrics.get(metric))
     }
@@ -133,12 +134,12 @@ impl<'r> Comparison<'r> {
 
 /// Time of `base` / time of `cell`: how many times as fast the cell is.
 ///
-/// The ratio of the two shown values.
+/// The ratio of the two reported values.
 pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
     Some(base.time()?.value / cell.time()?.value)
 }
 
-/// Values by their key, both in the order in which they come.
+/// Values by their key, both in the order of occurrence.
 pub fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
     let mut groups: Vec<(K, Vec<V>)> = Vec::new();
     for (key, value) in pairs {
@@ -150,13 +151,13 @@ pub fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, 
     groups
 }
 
-/// Every value once, in the order in which they come.
+/// Every value once, in the order of occurrence.
 pub fn unique<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
     let groups = grouped(all.map(|value| (value, ())));
     groups.into_iter().map(|(value, _)| value).collect()
 }
 
-/// Group and structure, which a report has once.
+/// Group and structure, a unique key in a report.
 fn named(cell: &ReportCell) -> (String, &str) {
     (cell.key().group.id(), &cell.structure)
 }
@@ -164,7 +165,7 @@ fn named(cell: &ReportCell) -> (String, &str) {
 /// A cell in both reports.
 pub type Pair<'r> = (&'r ReportCell, &'r ReportCell);
 
-/// Cells of the same name, and those that only one side has, in their order.
+/// Cells of the same name, and those of only one side, in their order.
 pub(super) type Matched<'r> = (Vec<Pair<'r>>, [Vec<&'r ReportCell>; 2]);
 
 pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Matched<'r> {
@@ -179,9 +180,9 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
     (old.iter().filter_map(pair).collect(), alone)
 }
 
-/// Why the two cells are not the same question, if they are not.
+/// The reason why two cells are not the same query; `None` if they are.
 ///
-/// A process that ended before its scene was loaded knows neither items nor cameras.
+/// A process that ended before its scene was loaded has no numbers of items and cameras.
 pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     if old.scene.digest.is_empty() || new.scene.digest.is_empty() {
         return None;
@@ -192,7 +193,7 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
     let items = digests("other items", &old.scene.digest, &new.scene.digest);
     let (was, is) = (old.path.camera_count, new.path.camera_count);
     let count = (was != is).then(|| format!("{was} cameras and {is}"));
-    // A report may not know its cameras.
+    // A report may lack the digest of its cameras.
     let both = old.path.digest.as_ref().zip(new.path.digest.as_ref());
     let cameras = both.and_then(|(was, is)| digests("other cameras or motions", was, is));
     items.or(count).or(cameras)
@@ -229,9 +230,9 @@ pub fn timed_otherwise((old, new): Pair) -> Option<String> {
 pub struct Overall<'r> {
     /// Structure that speed-ups refer to.
     ///
-    /// `linear`; where it has no times, the slowest of those that have times everywhere.
+    /// `linear`; if it has no times, the slowest of those with times everywhere.
     pub base: Option<&'r str>,
-    /// Those with times everywhere, fastest first; the others behind them.
+    /// Structures with times everywhere, fastest first; then the others.
     pub standings: Vec<Mean<'r>>,
 }
 
@@ -241,16 +242,16 @@ pub struct Mean<'r> {
     pub structure: &'r str,
     /// Geometric mean of its speed-ups vs the base; `None` if a time is missing.
     pub speedup: Option<f64>,
-    /// Comparisons in which it has the first rank, alone or not.
+    /// Comparisons in which it has the first rank, alone or shared.
     pub first_in: usize,
-    /// Logarithm of its mean time, less the base's, in each process.
+    /// Logarithm of its mean time minus the base's, in each process.
     logs: Vec<f64>,
 }
 
 impl Mean<'_> {
-    /// True if no paired test over the processes tells the means apart.
+    /// True if no paired test over the processes finds the means different.
     ///
-    /// Without a test, if they are less than 1.5 % apart.
+    /// Without a test, if they differ by less than 1.5 %.
     pub fn ties_with(&self, other: &Mean) -> bool {
         let (own, other) = (&self.logs, &other.logs);
         let apart = own.iter().sum::<f64>() - other.iter().sum::<f64>();
@@ -262,7 +263,7 @@ impl Mean<'_> {
 }
 
 impl<'r> Overall<'r> {
-    /// The structures of `all`; of several, those that decide nothing do not count.
+    /// The structures of `all`; among several, uninformative ones do not count.
     pub fn of(all: &[&Comparison<'r>]) -> Overall<'r> {
         let ranked = || all.iter().filter(|c| all.len() == 1 || c.decides());
         let cells = all.iter().flat_map(|comparison| &comparison.cells);

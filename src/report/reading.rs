@@ -1,7 +1,7 @@
-//! Reading what runs have left: a report, or the stream behind it.
+//! Reads the results of runs: a report, or the stream it is made from.
 //!
-//! The stream may be whole or stopped at any moment. Every error says where, what was found and
-//! what was expected.
+//! The stream may be complete or cut off at any byte. Every error names the place, what was found
+//! and what was expected.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,8 +23,7 @@ use crate::statistics::median;
 ///
 /// Unknown fields are ignored.
 ///
-/// # Errors
-/// I/O errors, a file that is not a report, or another schema version.
+/// # Errors I/O errors, a file that is not a report, or another schema version.
 pub fn read_report(path: &Path) -> Result<Report, InputError> {
     if !path.is_dir() {
         return read_json(path.to_owned());
@@ -39,7 +38,7 @@ pub fn read_report(path: &Path) -> Result<Report, InputError> {
 }
 
 fn read_json(path: PathBuf) -> Result<Report, InputError> {
-    /// Read first: another version has other fields, and that is no damage.
+    /// Read first: another version has other fields, and that is not damage.
     #[derive(Deserialize)]
     struct Versioned {
         schema_version: u32,
@@ -64,14 +63,12 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
 
 /// Reads the stream of a run, and the ends of its lines in bytes.
 ///
-/// The ends of the header, of each part, and last of the whole without half a line at its
-/// end.
+/// The ends of the header and of each part, then the end of the last complete line.
 ///
-/// # Errors
-/// Errors of the file system; a line that is none or does not belong there (by its
-/// number); another schema version.
+/// # Errors I/O errors; a line that is invalid or out of place (by its number); another schema
+/// version.
 pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
-    /// Read first: the kind of the rest of the line.
+    /// Read first: the kind of the line.
     #[derive(Deserialize)]
     struct Tag {
         line: String,
@@ -122,7 +119,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
                 let Some(group) = group else {
                     return bad(&found, "a part of the plan in the first line");
                 };
-                // Counted twice, it would be a process more than there was.
+                // Counted twice, it would add a process that did not exist.
                 if !seen.insert((*group, *process)) {
                     return bad(&format!("{found} a second time"), "each part once");
                 }
@@ -158,11 +155,11 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
 /// A clock reading along a path: the median over all rounds.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reading {
-    /// Middle of the views, as an index of the path; of a motion the frame.
+    /// Middle of the views, as an index of the path; for a motion the frame.
     pub frame: f64,
     /// Number of views in the reading.
     pub queries: u32,
-    /// CPU time per query; of a motion per frame, update and all queries.
+    /// CPU time per query; for a motion per frame, update and all queries.
     pub ns: f64,
 }
 
@@ -183,9 +180,9 @@ type Readings = BTreeMap<(u32, u32), Vec<f64>>;
 /// Six names, then process, round, frame and queries.
 type SampleRow = ([String; 6], [u32; 4], f64);
 
-/// The views of a report in the folder it came from, by the text of their keys.
+/// The views of a report in its folder, by the text of their keys.
 ///
-/// Nothing without the stream of the very run.
+/// Empty without the stream of the same run.
 pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
     let stream = read_stream(&folder.join(STREAM));
     let Some((stream, _)) = stream.ok().filter(|s| s.0.header.run.id == report.run.id) else {
@@ -250,7 +247,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let refused = |text: &[u8]| {
             fs::write(folder.path().join(REPORT), text).unwrap();
-            // The folder or the file in it: the same.
+            // The folder or the file in it: the same result.
             let error = read_report(folder.path()).unwrap_err().to_string();
             let again = read_report(&folder.path().join(REPORT)).unwrap_err();
             assert_eq!(error, again.to_string());

@@ -1,7 +1,7 @@
 //! The stream of a run: one JSON line for each part as soon as it is measured.
 //!
-//! Lines are appended and never rewritten, and the report is made of them. Whatever ends a run,
-//! the lines that are there are whole but for the last.
+//! Lines are appended and never rewritten, and the report is made from them. However a run ends,
+//! all lines but the last are complete.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -22,23 +22,23 @@ use crate::statistics::{geometric_mean, two_speeds};
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
 pub enum Line<'l> {
-    /// The first line: everything about the run but its cells.
+    /// The first line: everything about the run except its cells.
     Run(&'l Header),
     /// Results of one process for one group of cells.
     Part(&'l KeptPart),
-    /// All parts of the plan are there.
+    /// All parts of the plan are present.
     Finished {
         /// RFC 3339, UTC.
         at: &'l str,
     },
 }
 
-/// Place, program and options of a run.
+/// Machine, program and options of a run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Header {
     /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the program that wrote it.
     pub schema_version: u32,
-    /// The command and when it was begun.
+    /// The command and when it started.
     pub run: RunInfo,
     /// The arguments of `run`, to continue with.
     pub args: Vec<String>,
@@ -48,25 +48,24 @@ pub struct Header {
     pub toolchain: Toolchain,
     /// Version and commit of the program.
     pub source: Source,
-    /// The groups of the plan, in order; of a shard its own.
+    /// The groups of the plan, in order; for a shard its own.
     pub groups: Vec<GroupKey>,
     /// Groups of the whole plan, in order, if this run is a shard.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub whole: Vec<GroupKey>,
-    /// The structures of the plan, as asked for.
+    /// The structures of the plan, as requested.
     pub structures: Vec<String>,
     /// SHA-256 of the program.
     pub binary: Option<String>,
-    /// SHA-256 of the files of suite, cameras and motions, by their names in the plan.
+    /// SHA-256 of the files of suite, cameras and motions, by name in the plan.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub files: BTreeMap<String, String>,
 }
 
 impl Line<'_> {
-    /// The line as JSON, with its end.
+    /// The line as JSON, with its newline.
     ///
-    /// # Errors
-    /// None are expected: all of it is text, numbers and maps with names.
+    /// # Errors None are expected: it consists of text, numbers and maps with text keys.
     pub fn to_json(&self) -> io::Result<Vec<u8>> {
         let mut text = serde_json::to_vec(self)?;
         text.push(b'\n');
@@ -75,7 +74,7 @@ impl Line<'_> {
 }
 
 impl Header {
-    /// Header of a plan that begins here and now, without a command line.
+    /// Header of a plan that starts now on this machine, without a command line.
     pub fn of(plan: &Plan, machine: Machine, id: String, started_at: String) -> Header {
         let threads = plan.structures.iter().map(|s| s.execution.threads);
         Header {
@@ -103,7 +102,7 @@ impl Header {
         differences(self.place(), other.place()).next()
     }
 
-    /// The first fact in which the plans of two runs differ, or else their places.
+    /// The first fact in which two plans differ, or else two machines or builds.
     pub fn differs(&self, other: &Header) -> Option<Setting> {
         let of_plans = differences(self.plan(), other.plan()).next();
         of_plans.or_else(|| self.differs_in_place(other))
@@ -112,7 +111,7 @@ impl Header {
     fn place(&self) -> Vec<Fact> {
         let (machine, source) = (&self.machine, &self.source);
         let (version, features) = (self.schema_version.to_string(), machine.features.join(","));
-        // A system keeps some of it for itself, now more, now less.
+        // The system reserves a varying part of it.
         let gib = |bytes: u64| format!("{:.0} GiB", bytes as f64 / f64::from(1 << 30));
         let memory = machine.memory_bytes.map(gib);
         let dirty = source.dirty.map(|dirty| dirty.to_string());
@@ -151,7 +150,7 @@ impl Header {
     }
 }
 
-/// A part with what samples.csv holds up to its end.
+/// A part with the length of samples.csv after it.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct KeptPart {
     /// Results of the process.
@@ -162,19 +161,19 @@ pub struct KeptPart {
     pub samples_end: u64,
 }
 
-/// Everything that a stream holds.
+/// The contents of a stream.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct Stream {
     /// The first line.
     pub header: Header,
-    /// In the order in which they were measured.
+    /// Parts in the order of measurement.
     pub parts: Vec<KeptPart>,
-    /// RFC 3339, UTC; `None` for a run that continues or was stopped.
+    /// RFC 3339, UTC; `None` for a run that is running or was stopped.
     pub finished_at: Option<String>,
 }
 
 impl Stream {
-    /// The stream of a run that has just begun.
+    /// The stream of a run that has just started.
     pub fn of(header: Header) -> Stream {
         Stream {
             header,
@@ -197,7 +196,7 @@ impl Stream {
         self.finished_at.is_some() && all.all(|key| (0..processes).all(|p| self.has(key, p)))
     }
 
-    /// Returns true if that process has measured that group.
+    /// Returns true if the process has measured the group.
     pub fn has(&self, key: &GroupKey, process: u32) -> bool {
         let mut parts = self.parts.iter().map(|kept| &kept.part);
         parts.any(|part| part.key == *key && part.process == process)
@@ -271,8 +270,7 @@ pub fn digits(clock: SystemTime) -> String {
 
 /// RFC 3339 in UTC, to the second.
 ///
-/// A clock out of range gives the nearest time that a report can be dated with: it is no
-/// reason not to measure.
+/// A clock out of range is clamped to the nearest valid date: that is no reason not to measure.
 pub fn utc(clock: SystemTime) -> String {
     // 9999-12-31T23:59:59Z.
     let last = UNIX_EPOCH + Duration::from_secs(253_402_300_799);
@@ -307,7 +305,7 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
     let twins = report.noise.twins.iter();
     let holds = twins.filter_map(super::TwinEntry::holds_one);
     let (all, missed) = (holds.clone().count(), holds.filter(|holds| !holds).count());
-    // One in twenty misses by chance; this many of `all` are no chance.
+    // One in twenty misses by chance; more than this number of `all` is not chance.
     if missed > 1 + all / 8 {
         warnings.push(format!(
             "of {all} structures that were entered twice, {missed} differ from themselves: the \

@@ -1,7 +1,7 @@
 //! The crossover surface: which structure wins where.
 //!
-//! Over the number of items and the share of them that is visible; also from which size on a
-//! structure is faster than the linear scan. Read off a report; nothing is measured.
+//! Over the number of items and the visible share of them; also the size from which a structure is
+//! faster than the linear scan. Evaluated from a report; nothing is measured.
 
 use std::mem::replace;
 
@@ -18,32 +18,32 @@ pub struct Surface<'r> {
     pub cache: &'r str,
     /// Name of the culling test.
     pub test: &'r str,
-    /// Places by number of items, then by share.
+    /// Points by number of items, then by share.
     pub places: Vec<Place<'r>>,
 }
 
-/// A comparison as a place on a surface.
+/// A comparison as a point of a surface.
 pub struct Place<'r> {
     /// Number of items in the scene.
     pub items: usize,
     /// Visible items / items, as measured.
     pub share: f64,
-    /// The share to the nearest of 1, 1.5, 2, 3, 5, 7, 10, ... percent and parts of it.
+    /// The share rounded to 1, 1.5, 2, 3, 5, 7, 10, ... percent and fractions of it.
     ///
-    /// Never further than a factor of 1.3.
+    /// Off by at most a factor of 1.3.
     pub class: f64,
-    /// The cells there, and how they rank.
+    /// The cells there, and their ranks.
     pub comparison: Comparison<'r>,
 }
 
-/// From how many items on a structure is faster than the linear scan.
+/// Number of items from which a structure is faster than the linear scan.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Crossing {
-    /// At every size that was measured, this being the smallest.
+    /// Faster at every measured size; this is the smallest.
     Below(usize),
     /// Between two sizes, by interpolation of the logarithms.
     At(f64),
-    /// Not at the largest size that was measured.
+    /// Not faster at the largest measured size.
     Above(usize),
 }
 
@@ -64,22 +64,20 @@ pub fn world_of(scene: &str) -> String {
 fn class_of(share: f64) -> f64 {
     let decade = share.log10().floor() as i32;
     let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].map(|step| step * 10f64.powi(decade));
-    // Not ten times the first: a class has one number.
+    // Not ten times the first: a class has one value.
     let steps = steps.into_iter().chain([10f64.powi(decade + 1)]);
     let far = |step: f64| (step / share).ln().abs();
     let nearest = steps.min_by(|a, b| far(*a).total_cmp(&far(*b)));
     nearest.unwrap_or(share).min(1.0)
 }
 
-/// The surfaces of all comparisons that ranked anything.
-///
-/// In the order in which they were measured.
+/// The surfaces of all comparisons with ranks, in the order of measurement.
 pub fn surfaces<'r>(comparisons: Vec<Comparison<'r>>) -> Vec<Surface<'r>> {
     let places = comparisons.into_iter().filter_map(|comparison| {
         let about = comparison.about();
         let share = 1.0 - comparison.of_any("cull_rate")?;
         comparison.winners().next()?;
-        // Nothing is visible: no place on a logarithmic axis. Frames are no queries.
+        // Nothing visible has no place on a logarithmic axis. Frames are not queries.
         if share.is_nan() || share <= 0.0 || !about.path.motion.is_empty() {
             return None;
         }
@@ -106,7 +104,7 @@ pub fn surfaces<'r>(comparisons: Vec<Comparison<'r>>) -> Vec<Surface<'r>> {
 }
 
 impl<'r> Place<'r> {
-    /// Returns true if the class is more than a tenth off the measured share.
+    /// Returns true if class and measured share differ by more than a tenth.
     pub fn is_off_class(&self) -> bool {
         !(0.9..=1.1).contains(&(self.share / self.class))
     }
@@ -118,37 +116,36 @@ impl<'r> Place<'r> {
 }
 
 impl Surface<'_> {
-    /// Ascending, each once.
+    /// Numbers of items, ascending, each once.
     pub fn sizes(&self) -> Vec<usize> {
         let mut sizes: Vec<usize> = self.places.iter().map(|p| p.items).collect();
         sizes.dedup();
         sizes
     }
 
-    /// Ascending, each once.
+    /// Classes of shares, ascending, each once.
     pub fn classes(&self) -> Vec<f64> {
         let mut classes = sorted(self.places.iter().map(|p| p.class).collect());
         classes.dedup();
         classes
     }
 
-    /// Structures with such sound cells, in the order they first appear.
+    /// Structures with sound cells that pass the test, in order of occurrence.
     pub fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let cells = self.places.iter().flat_map(|p| p.comparison.sound());
         let cells = cells.filter(|cell| is_one(cell));
         unique(cells.map(|cell| cell.structure.as_str()))
     }
 
-    /// Number of items from which a structure is faster than the linear scan for good.
+    /// Number of items from which a structure stays faster than the linear scan.
     ///
-    /// `None` if it is known at one size only. It is faster where that is shown
-    /// ([`Estimate::exceeds`]); in between, the logarithms of the speed-ups are
-    /// interpolated.
+    /// `None` if it was measured at one size only. Faster means shown to be
+    /// ([`Estimate::exceeds`]); between sizes the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
         let places = self.places.iter().filter(|place| place.class == class);
         let points = places.filter_map(|p| Some((p.items, p.cell(structure)?.value("speedup")?)));
         let mut curve: Vec<(usize, f64)> = points.filter(|point| point.1 > 0.0).collect();
-        // The first where several paths fall into the class.
+        // The first if several paths fall into the class.
         curve.dedup_by_key(|point| point.0);
         let is_faster = |point: &(usize, f64)| self.is_faster(structure, class, point.0);
         let faster: Vec<bool> = curve.iter().map(is_faster).collect();
@@ -164,7 +161,7 @@ impl Surface<'_> {
         }
         let [(n0, r0), (n1, r1)] = [curve[slower], curve[slower + 1]];
         let along = -r0.ln() / (r1.ln() - r0.ln());
-        // Faster by its time already, but not shown to be.
+        // Faster by its time, but not shown to be.
         if !(0.0..=1.0).contains(&along) {
             return Some(Crossing::Below(n1));
         }
@@ -172,7 +169,7 @@ impl Surface<'_> {
         Some(Crossing::At((n0 + along * (n1 - n0)).exp()))
     }
 
-    /// Returns true if it is shown to be faster in every path of size and class.
+    /// Returns true if it is shown to be faster on every path of this size and class.
     fn is_faster(&self, structure: &str, class: f64, items: usize) -> bool {
         let here = |place: &&Place| place.class == class && place.items == items;
         let mut places = self.places.iter().filter(here);
@@ -186,26 +183,26 @@ impl Surface<'_> {
 
 /// The growth of one structure.
 pub struct Growth<'r> {
-    /// Key of the series, which its cells have in common.
+    /// Key of the series, common to its cells.
     pub key: SeriesKey<'r>,
     /// Mean over the sizes.
     pub visible: f64,
-    /// Ascending.
+    /// Numbers of items, ascending.
     pub sizes: Vec<usize>,
     /// Least-squares slope of log query_ns over log N, with its 95 % interval.
     pub exponent: Estimate,
-    /// Their places in the report's list.
+    /// Their indices in the report's list.
     cells: Vec<usize>,
 }
 
-/// Visible counts this far apart are the same count.
+/// Largest ratio of visible counts that are considered equal.
 const SAME_COUNT: f64 = 1.3;
-/// Fewer sizes have no interval.
+/// Fewest sizes that give an interval.
 const LEAST_SIZES: usize = 3;
 
-/// All structures that were measured on at least three sizes of a world.
+/// All structures measured on at least three sizes of a world.
 ///
-/// With (about) the same number of visible items, by the same kind of path.
+/// With approximately the same number of visible items, on the same kind of path.
 pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     let ok = report.cells.iter().enumerate();
     let ok = ok.filter(|(_, c)| c.status == Status::Ok && c.path.motion.is_empty());
@@ -217,7 +214,7 @@ pub fn growths(report: &Report) -> Vec<Growth<'_>> {
     grouped(points).into_iter().flat_map(of_series).collect()
 }
 
-/// Gives every cell of a series its `growth_exponent`.
+/// Sets `growth_exponent` of every cell of a series.
 pub(super) fn enter_growths(report: &mut Report) {
     let found = growths(report).into_iter().map(|g| (g.cells, g.exponent));
     for (cells, exponent) in found.collect::<Vec<_>>() {
@@ -230,7 +227,7 @@ pub(super) fn enter_growths(report: &mut Report) {
 
 /// World, kind of path, cache state, culling test and structure.
 pub type SeriesKey<'r> = (String, &'r str, &'r str, &'r str, &'r str);
-/// Items, visible ones, ns, place of the cell.
+/// Items, visible ones, ns, index of the cell.
 type Point = (usize, f64, f64, usize);
 
 fn key(cell: &ReportCell) -> SeriesKey<'_> {
@@ -240,12 +237,12 @@ fn key(cell: &ReportCell) -> SeriesKey<'_> {
 }
 
 fn of_series<'r>((key, mut points): (SeriesKey<'r>, Vec<Point>)) -> Vec<Growth<'r>> {
-    // By items, the fewest visible first: they are the first of their size.
+    // By items, the fewest visible first, so that these come first for their size.
     points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut found = Vec::new();
     while let Some(least) = points.iter().map(|p| p.1).min_by(f64::total_cmp) {
         let mut last = 0;
-        // Cells beyond one a size are of another path, and of a later series.
+        // Further cells of a size are from another path, and go into a later series.
         let is_same = |p: &Point| p.1 <= least * SAME_COUNT && p.0 != replace(&mut last, p.0);
         let (same, others): (Vec<Point>, Vec<Point>) = points.into_iter().partition(is_same);
         points = others;
@@ -280,7 +277,7 @@ mod tests {
         }
     }
 
-    /// Structures with their times where `visible` of `items` items are visible.
+    /// A comparison with these times, where a `share` of `items` items is visible.
     fn comparison(items: usize, share: f64, times: &[(&str, f64)]) -> Comparison<'static> {
         let scene = format!("uniform:n={items},seed=3");
         let cells = times.iter().zip(1..).map(|(&(name, ns), rank)| {
@@ -321,7 +318,7 @@ mod tests {
             .map(|place| place.comparison.winners().any(ReportCell::is_scan))
             .collect();
         assert_eq!(linear, [true, false, false, false]);
-        // From a tenth to tenfold: half way by the logarithm.
+        // From a tenth to tenfold: half way on the logarithmic axis.
         let Some(Crossing::At(items)) = surface.crossing("bvh", 0.02) else {
             panic!("no crossing");
         };
@@ -368,10 +365,10 @@ mod tests {
             surfaces[0].crossing("bvh", 0.02)
         };
         let clear = || comparison(10_000, 0.02, &[("bvh", 100.0), ("linear", 1000.0)]);
-        // Faster by the clock at 1,000 items, but not told apart.
+        // Faster by its time at 1,000 items, but not significantly.
         let found = crossing(vec![tied(1_000, 950.0), clear()]);
         assert_eq!(found, Some(Crossing::Below(10_000)));
-        // Not in another path of that size.
+        // Not on another path of that size.
         let found = crossing(vec![clear(), tied(10_000, 900.0), tied(1_000, 950.0)]);
         assert_eq!(found, Some(Crossing::Above(10_000)));
         let found = crossing(vec![tied(1_000, 950.0), tied(10_000, 900.0)]);
@@ -390,7 +387,7 @@ mod tests {
         ] {
             assert!((class_of(share) / class - 1.0).abs() < 1e-9, "{share}");
         }
-        // As far as is said, over six powers of ten.
+        // The stated precision, over six powers of ten.
         for step in 0..6000 {
             let share = 10f64.powf(-f64::from(step) / 1000.0);
             let off = class_of(share) / share;
@@ -412,7 +409,7 @@ mod tests {
     fn only_one_count_over_several_sizes_has_an_exponent() {
         let key = || ("uniform".to_owned(), "orbit", "warm", "six-plane", "bvh");
         let grown = |points: &[Point]| of_series((key(), points.to_vec()));
-        // 500 visible: N^0.5 exactly; 2 % visible grows along and says nothing.
+        // 500 visible: N^0.5 exactly; 2 % visible grows with N and is not a series.
         let points = [
             (10_000, 500.0, 100.0, 7),
             (1_000_000, 510.0, 1000.0, 3),
@@ -429,7 +426,7 @@ mod tests {
         assert_eq!(found[0].cells, [7, 5, 3]);
         assert!((found[0].visible - 500.0).abs() < 1e-9);
         assert!(grown(&points[..2]).is_empty());
-        // Two paths of one size are not two sizes.
+        // Two paths at one size are not two sizes.
         let twice = [points[0], points[0], points[1], points[1]];
         assert!(grown(&twice).is_empty());
         // Two paths whose counts are within 30 % of each other keep their own sizes.

@@ -1,8 +1,8 @@
 //! Files of a run and their names; files that appear whole or not at all.
 //!
-//! They are written beside their place under a temporary name, then renamed into it. A
-//! process locks its temporary names while it runs; an unlocked one is the leftover of a
-//! killed process, and the next write into the same folder removes it.
+//! Files are written under a temporary name in the same folder, then renamed. A process locks its
+//! temporary names while it runs; an unlocked one is left over from a killed process, and the next
+//! write into the same folder removes it.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -15,16 +15,15 @@ use super::SCHEMA_VERSION;
 use crate::input::InputError;
 use crate::json::JsonError;
 
-/// Beginning and end of temporary names.
+/// Prefix and suffix of temporary names.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 
 /// Writes a file whole or not at all.
 ///
-/// A link stays one, and its target is replaced; an existing file keeps its permissions. A
-/// terminal, a pipe or a device is written to and never replaced.
+/// A link is kept, and its target is replaced; an existing file keeps its permissions. A terminal,
+/// a pipe or a device is written to and never replaced.
 ///
-/// # Errors
-/// I/O errors, with the path.
+/// # Errors I/O errors, with the path.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -40,7 +39,7 @@ pub fn write_atomically(
     attempt().map_err(io(path))
 }
 
-/// The file that a path leads to; `None` for a terminal, a pipe or a device.
+/// The file that a path refers to; `None` for a terminal, a pipe or a device.
 fn target(path: &Path) -> io::Result<Option<PathBuf>> {
     match fs::metadata(path) {
         Ok(found) if !found.is_file() && !found.is_dir() => Ok(None),
@@ -49,8 +48,9 @@ fn target(path: &Path) -> io::Result<Option<PathBuf>> {
     }
 }
 
-/// The same of a file in a folder of the program's own. Anything of its name, a
-/// link too, is replaced.
+/// Replaces a file in a folder of the program's own.
+///
+/// Whatever has its name is replaced, a link too.
 pub(super) fn replace_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -60,7 +60,7 @@ pub(super) fn replace_atomically(
 
 fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let folder = folder_of(target);
-    // A missing folder is reported by its own name, not by a temporary one.
+    // A missing folder is reported by its own name instead of a temporary one.
     fs::metadata(folder)?;
     let mut file = temporary_in(folder)?;
     {
@@ -77,7 +77,7 @@ fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
     Ok(())
 }
 
-/// The folder that a file is in.
+/// The folder of a file.
 pub fn folder_of(file: &Path) -> &Path {
     match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -87,40 +87,37 @@ pub fn folder_of(file: &Path) -> &Path {
 
 /// Tries to write into the folder of a future file, and leaves nothing there.
 ///
-/// A folder that is read-only or full is found before the work.
+/// Detects a read-only or full folder before the work.
 ///
-/// # Errors
-/// I/O errors, with the path.
+/// # Errors I/O errors, with the path.
 pub fn try_place(path: &Path) -> Result<(), InputError> {
-    // A pipe or a device has no place; opening a pipe would wait for its reader.
+    // A pipe or a device has no folder; opening a pipe would wait for its reader.
     let target = target(path).map_err(io(path))?;
     let tried = target.map_or(Ok(()), |target| try_writing(folder_of(&target)));
     tried.map_err(io(path))
 }
 
-/// The same of a folder that is there or is to be made.
+/// [`try_place`] for a folder that exists or will be created.
 ///
-/// # Errors
-/// I/O errors, with the path.
+/// # Errors I/O errors, with the path.
 pub fn try_folder(path: &Path) -> Result<(), InputError> {
     let folder = path.ancestors().find(|folder| folder.exists());
     try_writing(folder.unwrap_or(Path::new("."))).map_err(io(path))
 }
 
-/// Writes a block and takes it away again.
+/// Writes a block and removes it.
 fn try_writing(folder: &Path) -> io::Result<()> {
     temporary_in(folder)?.write_all(&[0; 4096])
 }
 
-/// Makes a file that ends with this process, or with the next write beside it.
+/// Creates a file removed at the end of this process or the next write beside it.
 ///
-/// # Errors
-/// I/O errors.
+/// # Errors I/O errors.
 pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     Ok(locked_temporary_in(folder)?.0)
 }
 
-/// The same, and why it could not be locked where a file system has no locks.
+/// [`temporary_in`], with the reason if a file system has no locks.
 pub(super) fn locked_temporary_in(
     folder: &Path,
 ) -> io::Result<(NamedTempFile, Result<(), TryLockError>)> {
@@ -128,7 +125,7 @@ pub(super) fn locked_temporary_in(
     loop {
         let made = named(0o666).tempfile_in(folder)?;
         match made.as_file().try_lock() {
-            // Another process has swept it away between the two calls.
+            // Another process has removed it between the two calls.
             Err(TryLockError::WouldBlock) => {}
             Ok(()) if !made.path().exists() => {}
             locked => return Ok((made, locked)),
@@ -136,8 +133,9 @@ pub(super) fn locked_temporary_in(
     }
 }
 
-/// Makes a folder that ends with this process, or with the next write beside it.
-/// Locked for as long as the file is open.
+/// Creates a folder removed at the end of this process or the next write beside it.
+///
+/// Locked as long as the file is open.
 pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
     sweep(folder);
     loop {
@@ -154,8 +152,10 @@ pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<(TempDir, Option<
     }
 }
 
-/// Builder of temporary names. Those are private by themselves; results are meant
-/// to be read, as far as the user's umask lets them.
+/// Builder of temporary names.
+///
+/// Temporary files are private by default; results should be readable, as far as the user's umask
+/// permits.
 fn named(mode: u32) -> Builder<'static, 'static> {
     let mut builder = Builder::new();
     builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
@@ -169,7 +169,7 @@ fn named(mode: u32) -> Builder<'static, 'static> {
     builder
 }
 
-/// Takes away what killed processes have left half written in a folder.
+/// Removes incomplete files of killed processes from a folder.
 pub(super) fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let (name, path) = (entry.file_name(), entry.path());
@@ -178,7 +178,7 @@ pub(super) fn sweep(folder: &Path) {
             && name.ends_with(TEMPORARY.1)
             && let Ok(kind) = entry.file_type()
             && (kind.is_file() || kind.is_dir())
-            // Held until it is gone, so that its maker sees it.
+            // Locked until it is removed, so that its creator notices.
             && let Ok(lock) = File::open(&path)
             && !matches!(lock.try_lock(), Err(TryLockError::WouldBlock))
         {
@@ -200,30 +200,30 @@ pub(super) const STREAM: &str = "stream.jsonl";
 pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
                                          queries,cpu_ns,wall_ns,returned\n";
 
-/// An error in a file or folder: the text says what was found and expected.
+/// An error in a file or folder; the text says what was found and expected.
 pub(super) fn at(path: &Path, text: impl Display) -> InputError {
     InputError::new(format_args!("{}: {text}", path.display()))
 }
 
-/// An error of the file system about a path.
+/// An I/O error about a path.
 pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> InputError + Copy {
     InputError::io(path, "file or folder")
 }
 
-/// Text that is not the JSON of `whole`, such as "the report of a run".
+/// The error of a text that is not JSON of `whole`, such as "the report of a run".
 pub(super) fn json(path: &Path, error: &JsonError, whole: &str) -> InputError {
     let expected = error.expected_of(whole);
     let file = path.display().to_string();
     InputError::at(&file, error.place(), &error.found, expected)
 }
 
-/// A file of another schema version.
+/// The error of a file with another schema version.
 pub(super) fn version(path: &Path, found: u32) -> InputError {
     let text = format!("schema version {found}; expected {SCHEMA_VERSION}");
     at(path, text)
 }
 
-/// A folder that holds a run already.
+/// The error of a folder that contains a run already.
 pub(super) fn taken(path: &Path) -> InputError {
     InputError::new(format_args!(
         "{} already holds a run; expected an empty or new folder (run --resume continues a run)",

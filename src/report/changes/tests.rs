@@ -9,7 +9,7 @@ use serde_json::json;
 
 const QUERY: &[&str] = &["query_ns"];
 const NAMES: [&str; 5] = ["a", "b", "c", "d", "e"];
-/// Far apart, so that no median over them is one of its neighbours'.
+/// Far apart, so that no median over them is close to another one's value.
 const LEVELS: [f64; 5] = [50.0, 100.0, 130.0, 150.0, 900.0];
 
 /// A report of these cells.
@@ -30,8 +30,7 @@ fn report(cells: Vec<ReportCell>) -> Report {
     Report { cells, ..report }
 }
 
-/// A cell with a time in each process: the machine's speed, common to all
-/// cells, and a little of its own.
+/// A cell with a time per process: a machine speed common to all cells, and noise.
 fn timed(name: &str, ns: f64, processes: usize, day: f64) -> ReportCell {
     let mut timed = cell("s", 10, "p", name, ns);
     let own = name.bytes().map(usize::from).sum::<usize>();
@@ -81,14 +80,14 @@ fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
         assert!((judged.ratio / factor - 1.0).abs() < 0.01, "{judged:?}");
         assert_eq!(found.count(Outcome::Same), 4, "{:?}", outcomes(&found));
         assert_eq!(found.is_regression(), wanted == Outcome::Slower);
-        // What moved all of them is said of all of them.
+        // A shift common to all is reported for all.
         let shift = &found.common_shifts[0];
         assert!(shift.lower < Some(1.5) && Some(1.5) < shift.upper);
         assert_eq!(shift.cells, 5);
     }
 }
 
-/// The others of one that stood still are four, half of which have moved.
+/// A structure that stood still has four others, half of which have moved.
 #[test]
 fn two_structures_of_five_that_moved_are_found() {
     let (old, mut new) = (all(10, 1.0), all(10, 1.5));
@@ -113,7 +112,7 @@ fn one_process_and_few_others_are_inconclusive() {
         assert!(b.reason.as_ref().unwrap().contains("under three processes"));
         assert!(!found.is_regression());
     }
-    // Both reasons hold: more processes alone would not decide.
+    // Both reasons are given: more processes alone would not decide.
     let [mut old, mut new] = [all(1, 1.0), all(1, 1.0)];
     for report in [&mut old, &mut new] {
         report.cells.truncate(3);
@@ -126,7 +125,7 @@ fn one_process_and_few_others_are_inconclusive() {
             .iter()
             .all(|row| row.reason.as_ref() == Some(&both))
     );
-    // Two of three structures: which of them moved is not known.
+    // Two of three structures: it is unknown which of them moved.
     let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
     new.cells[1] = timed("b", 500.0, 10, 1.0);
     for report in [&mut old, &mut new] {
@@ -134,7 +133,7 @@ fn one_process_and_few_others_are_inconclusive() {
     }
     let found = changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY);
     assert_eq!(found.count(Outcome::Inconclusive), 3);
-    // The quotient of the values is no change relative to others.
+    // The ratio of the values is not a change relative to others.
     let first = &found.rows[0];
     assert_eq!((first.judgement, first.ratio()), (None, None));
     assert!(first.reason.as_ref().unwrap().contains("under three other"));
@@ -213,7 +212,7 @@ fn statuses_and_questions_go_before_times() {
     }
 }
 
-/// A process that ends before its scene is loaded knows no items and no cameras.
+/// A process that ends before its scene is loaded counts no items and no cameras.
 #[test]
 fn an_answer_that_is_not_given_for_want_of_a_scene_is_lost() {
     for status in [Status::TimedOut, Status::OutOfMemory] {
@@ -299,7 +298,7 @@ fn a_scene_that_moved_as_a_whole_is_named() {
     assert_eq!(same.common_shifts.len(), 1);
 }
 
-/// Copies of a figure would prove more than was seen.
+/// Copies of a figure would count as more evidence than there is.
 #[test]
 fn a_build_that_paths_share_is_one_figure() {
     let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
@@ -317,7 +316,7 @@ fn a_build_that_paths_share_is_one_figure() {
         }
         report.cells.extend(others);
     }
-    // The build of the other path counts where this one has no answer, but has none beside it.
+    // The other path's build counts if this one has no answer, but has none to compare with.
     old.cells[3].status = Status::TimedOut;
     let sides = [&old.cells[..], &new.cells];
     let found = changes(Basis::Reports, sides, 0.05, &["build_ms"]);
@@ -343,7 +342,7 @@ fn counters_are_compared_exactly_and_judge_nothing() {
     assert_eq!((work.len(), work[0].counter), (1, "planes_tested"));
     assert_eq!((work[0].old, work[0].new), (100.0, 100.001));
     assert_eq!(found.count(Outcome::Same), 5);
-    // Of another scene they are another question's.
+    // For another scene they answer another query.
     new.cells[1].scene.digest.push('x');
     assert!(
         changes(Basis::Reports, [&old.cells, &new.cells], 0.05, QUERY)
@@ -366,7 +365,7 @@ fn only_what_has_times_is_judged() {
     assert_eq!(found.count(Outcome::Unmeasured), 7);
     // Three are left, with two others each.
     assert_eq!(found.count(Outcome::Inconclusive), 3);
-    // What neither side ever had is no news.
+    // A metric that neither side ever had is no news.
     let news = found.rows.iter().filter(|row| row.is_news());
     assert_eq!(news.count(), 5);
     assert!(!found.judges_nothing());
@@ -377,7 +376,7 @@ fn only_what_has_times_is_judged() {
         &["locate_ns"],
     );
     assert!(found.judges_nothing());
-    // A time of frames has no row at rest.
+    // A frame time has no row for a still scene.
     let sides = [&old.cells[..], &new.cells];
     assert!(changes(Basis::Reports, sides, 0.05, &["frame_ns"]).judges_nothing());
     for cell in old.cells.iter_mut().chain(&mut new.cells) {

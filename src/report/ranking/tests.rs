@@ -1,4 +1,4 @@
-//! Ranks as a report has them, on cells made by hand.
+//! Ranks as reports have them, on handmade cells.
 
 use super::*;
 use crate::index::Origin;
@@ -22,7 +22,7 @@ pub fn cell(scene: &str, items: usize, path: &str, structure: &str, ns: f64) -> 
 
 #[test]
 fn ranks_are_the_runs_own_and_what_failed_has_none() {
-    // "a" and "peer-x" share a rank, whatever their times say.
+    // "a" and "peer-x" share a rank, whatever their times.
     let rows = [
         ("peer-x", 104.0, Some(1)),
         ("a", 100.0, Some(1)),
@@ -52,7 +52,7 @@ fn ranks_are_the_runs_own_and_what_failed_has_none() {
         .iter()
         .map(|cell| (cell.structure.as_str(), cell.rank))
         .collect();
-    // In the order they came in, the two that failed.
+    // The two that failed are in the order of their input.
     let wanted = [
         ("a", Some(1)),
         ("peer-x", Some(1)),
@@ -91,7 +91,7 @@ fn cells_are_matched_by_their_whole_name_each_once() {
     ] {
         assert_eq!(changed(change), (0, [1, 1]));
     }
-    // What was measured and found is no part of the name.
+    // Measured values are not part of the name.
     assert_eq!(changed(|c| c.scene.digest.push('x')), (1, [0, 0]));
 }
 
@@ -106,7 +106,7 @@ fn no_time_of_zero_or_below_has_a_rank() {
     }
 }
 
-/// Two paths with times of each structure, ranked by them.
+/// Two paths with times of each structure, ranked by these.
 fn cells(rows: &[(&str, [f64; 2])]) -> Vec<ReportCell> {
     let of_path = |path: usize| {
         let of_row = move |row: &(&str, [f64; 2])| {
@@ -150,7 +150,7 @@ fn means_are_geometric_and_refer_to_linear_or_else_to_the_slowest() {
         assert_eq!((bvh.0.as_str(), bvh.2), ("bvh", 2));
         assert!(near(bvh.1, 4.0) && near(linear.1, 1.0) && near(slow.1, 0.25));
     });
-    // A wrong answer of linear: it counts nowhere, and is still named.
+    // A wrong answer of linear: it counts nowhere, and is still listed.
     let mut failed = cells(&rows);
     failed[0].rank = None;
     overall(&failed, |overall| {
@@ -173,7 +173,7 @@ fn means_tie_unless_the_processes_tell_them_apart() {
         });
     };
     ties(&cells, [false, false]);
-    // Processes differ tenfold, and the two structures within them by 3 % or by more.
+    // Processes differ tenfold, the two structures within them by 3 % or more.
     for (swing, wanted) in [(0.0, [false, false]), (0.2, [true, false])] {
         for cell in &mut cells {
             let ns = cell.value("query_ns").unwrap();
@@ -188,7 +188,7 @@ fn means_tie_unless_the_processes_tell_them_apart() {
 
 #[test]
 fn a_speedup_without_linear_has_the_interval_of_its_own_ratio() {
-    // Twice as slow and twice as fast as before in turns, and always a ratio of two.
+    // Alternately half and twice as fast as before, always with a ratio of two.
     let times = |factor: f64| -> Vec<f64> {
         let speeds = [1.0, 2.0, 1.0, 2.0, 1.01, 2.01];
         speeds.iter().map(|speed| speed * factor).collect()
