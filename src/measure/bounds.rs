@@ -1,7 +1,7 @@
 //! Lower bounds, timed beside the structures: the cost of memory accesses alone.
 //!
-//! A bound answers nothing and is never ranked. It takes part in the same rounds as the
-//! structures, so that a ratio to it is paired like any other.
+//! A bound answers nothing and is never ranked. It takes part in the same rounds as the structures,
+//! so that a ratio to it is paired like any other.
 
 use super::{TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
@@ -16,8 +16,8 @@ pub struct Bound {
     pub summary: &'static str,
     /// Makes the task of the bound, with its own copy of the data.
     ///
-    /// From the queries that it bounds, the kernel that the structures are queried with, and
-    /// the number of items that each camera sees. `None` if there is nothing to read or copy.
+    /// From the queries to bound, the kernel of the structures' queries, and the number of items
+    /// that each camera sees. `None` if there is nothing to read or copy.
     pub make: fn(&Workload, Kernel, &[u64]) -> Option<TimedTask<'static>>,
 }
 
@@ -58,9 +58,9 @@ fn memcpy(workload: &Workload, _: Kernel, visible: &[u64]) -> Option<TimedTask<'
     let count = workload.items.len();
     let ids: Vec<ItemId> = (0..count as ItemId).collect();
     let lengths: Vec<usize> = visible.iter().map(|&v| v as usize).collect();
-    // Each query copies from another place, as answers do: always the first ids
-    // would be always the same few cache lines.
-    // Multiples of 2^32 / golden ratio spread them (Knuth, TAOCP vol. 3, sec. 6.4).
+    // Each query copies from a different position, as answers do: the first ids alone would be
+    // always the same few cache lines. Multiples of 2^32 / golden ratio spread them (Knuth, TAOCP
+    // vol. 3, sec. 6.4).
     let scattered = |place: usize| (place as u32).wrapping_mul(0x9E37_79B9) as usize;
     let start = |(place, &length)| scattered(place) % (count + 1).saturating_sub(length).max(1);
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
@@ -99,7 +99,7 @@ mod tests {
         }
         let copied = memcpy(&workload, Kernel::best(), &visible).unwrap();
         assert_eq!(copied.expected, visible);
-        // Two queries of different places do not copy the same ids.
+        // Queries at two positions do not copy the same ids.
         let ids = |place| {
             let mut out = Vec::new();
             (copied.ask)(place, &mut out);
@@ -108,10 +108,10 @@ mod tests {
         assert_ne!(ids(1).first(), ids(5).first());
     }
 
-    /// The result of the bound, which is dropped elsewhere, is compared here.
+    /// Checks the result of the bound, which a measurement discards.
     #[test]
     fn the_read_bound_reads_the_bounds_of_every_item() {
-        // Whole blocks only: the lanes behind the last item are no item's.
+        // Whole blocks only: lanes after the last item hold no item.
         let scene = scene::load("uniform:n=320", &Default::default()).unwrap();
         let bits = |b: &Aabb| [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits));
         let all = scene.items.iter().flat_map(bits).flatten();

@@ -1,6 +1,6 @@
 //! A cell of a report: one structure on one scene, path and culling test.
 //!
-//! Scene and queries have digests, so that two reports can be compared for the same question.
+//! Scene and queries have digests, so that two reports can be checked for the same queries.
 
 use std::collections::BTreeMap;
 
@@ -27,26 +27,26 @@ pub struct ReportCell {
     pub structure: String,
     /// Kind that the structure declares; null for a bound.
     pub kind: Option<Kind>,
-    /// Likewise.
+    /// Origin that the structure declares; null for a bound.
     pub origin: Option<Origin>,
     /// Parameters of the structure, defaults included.
     pub params: Value,
     /// Name of the culling test.
     pub test: String,
-    /// How building, counting and timing ended.
+    /// Status of building, counting and timing.
     pub status: Status,
-    /// Why, where the status is not ok.
+    /// Reason, unless the status is ok.
     pub reason: Option<String>,
-    /// Rank by time, 1 for the fastest; null where there is no time.
+    /// Rank by time, 1 for the fastest; null without a time.
     ///
-    /// Cells that no test tells apart share a rank.
+    /// Cells without a significant difference share a rank.
     pub rank: Option<usize>,
     /// Basis of the metrics of time.
     #[serde(default)]
     pub times: CellTimes,
     /// Metrics by name; one that was not measured is absent.
     pub metrics: BTreeMap<String, Metric>,
-    /// Errors of the answers against the exact truth; null where nothing was answered.
+    /// Errors of the answers against the exact truth; null without answers.
     pub error: Option<Judged>,
     /// Digest of the ids returned to all frustum queries; absent if wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,15 +55,14 @@ pub struct ReportCell {
     pub left_out: Vec<String>,
     /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
-    /// Choice of a structure that chooses, and what it left out.
+    /// Choice of an adaptive structure and the rejected options; else absent.
     ///
-    /// Also frames in which a structure was built again as it could not refit. Absent of
-    /// any other.
+    /// Also the frames in which a structure was rebuilt because it could not refit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chose: Option<String>,
 }
 
-/// The cell's rows in samples.csv: those that have its names.
+/// The cell's rows in samples.csv: those with its names.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SamplesRef {
@@ -91,7 +90,7 @@ pub struct CellTimes {
     pub by_process: BTreeMap<String, Vec<f64>>,
 }
 
-/// A value, with its 95 % interval where it was sampled.
+/// A value, with its 95 % interval if it was sampled.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Metric {
@@ -126,7 +125,7 @@ impl Metric {
     }
 }
 
-/// A structure that was entered twice, with what its two times say.
+/// A structure that was measured twice, with the ratio of its two times.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TwinEntry {
@@ -159,7 +158,7 @@ impl TwinEntry {
 }
 
 impl ReportCell {
-    /// The key by which another report is searched for the same cell.
+    /// The key that identifies this cell in another report.
     pub fn key(&self) -> CellKey {
         CellKey {
             group: GroupKey::new(&self.scene.name, &self.path, &self.test),
@@ -172,7 +171,7 @@ impl ReportCell {
         self.kind == Some(Kind::Scan)
     }
 
-    /// Returns true for a scan, and for a structure that chooses and tested most items.
+    /// Returns true for a scan, and for an adaptive structure that tested most items.
     pub fn scans(&self) -> bool {
         let tested = self.value("items_tested").filter(|_| self.chose.is_some());
         let half = 0.5 * self.scene.total_count as f64;
@@ -219,15 +218,15 @@ pub struct SceneInfo {
     /// Axis that points up, y or z; empty in older reports.
     #[serde(default)]
     pub up: String,
-    /// Unit of coordinates; null where the file does not say.
+    /// Unit of coordinates; null if the file does not state it.
     pub unit: Option<String>,
-    /// Scene-local zero in world coordinates.
+    /// Scene-local origin in world coordinates.
     pub origin: [f64; 3],
     /// Smallest corner of all items, in world coordinates.
     pub bounds_min: [f64; 3],
     /// Largest corner of all items, in world coordinates.
     pub bounds_max: [f64; 3],
-    /// Items that were left out because they could not be read.
+    /// Number of items left out because they could not be read.
     pub skipped_items: usize,
     /// SHA-256 over origin and item bounds.
     pub digest: String,
@@ -270,23 +269,23 @@ pub struct PathInfo {
     pub camera_count: usize,
     /// "warm" or "cold".
     pub cache: String,
-    /// Name of the method that planes are derived by.
+    /// Name of the method that derives the planes.
     pub planes: String,
     /// Factor c of the planes' epsilon.
     pub epsilon: f64,
-    /// The numbers that the culling test is carried out in.
+    /// Arithmetic of the culling test.
     pub arithmetic: String,
     /// SHA-256 over the cameras' frames and lenses; null in older reports.
     pub digest: Option<String>,
     /// Lenses as used, and how matrices were read; null in older reports.
     pub lens: Option<CameraFacts>,
-    /// Doubts about the cameras, one line each.
+    /// Warnings about the cameras, one line each.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// File name or spec of the motion; absent for a still scene.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub motion: String,
-    /// Number of queries of a frame of the motion; absent for a still scene.
+    /// Number of queries per frame of the motion; absent for a still scene.
     #[serde(default, skip_serializing_if = "is_default")]
     pub views_per_frame: usize,
 }

@@ -1,6 +1,7 @@
 //! The two clocks: thread CPU time and wall time.
 //!
-//! CPU time ranks, because a shared machine may take the core away; wall time stands beside it.
+//! Structures are ranked by CPU time, because a shared machine may take the core away; wall time is
+//! reported beside it.
 
 use std::time::Instant;
 
@@ -13,14 +14,14 @@ use crate::statistics::median;
 pub struct Lap {
     /// CPU time of this thread, or of all threads.
     pub cpu_ns: f64,
-    /// Wall time, other programs included.
+    /// Wall time, which includes other programs.
     pub wall_ns: f64,
 }
 
 impl Lap {
-    /// The work of a lap, less the cost of an `empty` one.
+    /// The work of a lap, minus the cost of an `empty` one.
     ///
-    /// No less than a thirty-second of that cost, which is how well it is known.
+    /// At least a thirty-second of that cost, the precision to which it is known.
     pub fn less(self, empty: Lap) -> Lap {
         let less = |lap: f64, empty: f64| (lap - empty).max(empty / 32.0);
         Lap {
@@ -32,7 +33,7 @@ impl Lap {
 
 /// Both clocks, read together.
 ///
-/// The CPU clock is read innermost: it is the one that ranks.
+/// The CPU clock is read innermost, since structures are ranked by it.
 pub struct Stopwatch {
     wall: Instant,
     process: Option<ProcessTime>,
@@ -46,7 +47,7 @@ impl Stopwatch {
         Stopwatch::start_for(false)
     }
 
-    /// Starts both clocks; the CPU clock of all threads for work that threads share.
+    /// Starts both clocks; the CPU clock of all threads if threads share the work.
     #[inline]
     pub fn start_for(all_threads: bool) -> Self {
         let wall = Instant::now();
@@ -57,7 +58,7 @@ impl Stopwatch {
         }
     }
 
-    /// Cost of a lap: the medians of a few without work, at the speed of the moment.
+    /// Cost of a lap: medians of a few without work, at the machine's current speed.
     pub fn empty_lap(all_threads: bool) -> Lap {
         let laps = [(); 9].map(|()| Stopwatch::start_for(all_threads).lap());
         let middle = |of: fn(&Lap) -> f64| median(&laps.each_ref().map(of)).unwrap_or(0.0);

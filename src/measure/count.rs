@@ -1,7 +1,7 @@
 //! The count pass, which compares every answer with the reference, and the oracle.
 //!
-//! [`count_pass`]: every subject answers every query twice, with the counting recorder and
-//! as it will be timed. [`judge`] compares the right answers with the exact truth.
+//! [`count_pass`]: every subject answers every query twice, with the counting recorder and as it
+//! will be timed. [`judge`] compares the right answers with the exact truth.
 
 use std::time::{Duration, Instant};
 
@@ -21,13 +21,13 @@ use crate::verify::{
     ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility, scan,
 };
 
-/// A set of ids, so far as two answers are compared by it.
+/// A set of ids, reduced to the data that answers are compared by.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Answer {
     /// Number of ids.
     pub count: u64,
-    /// Sum over the ids of a hash of each: the order does not matter.
+    /// Sum over the ids of a hash of each: independent of their order.
     pub digest: u64,
 }
 
@@ -45,7 +45,7 @@ impl Answer {
 /// Answers of one subject, and their cost.
 #[derive(Clone, Default, Debug)]
 pub struct Counted {
-    /// Ok if every answer is that of the reference scan.
+    /// Ok if every answer equals that of the reference scan.
     pub verdict: Verdict,
     /// Frustum queries, one per camera, and region searches, one per eye.
     pub answers: [Vec<Answer>; 2],
@@ -56,7 +56,7 @@ pub struct Counted {
 impl Counted {
     /// Lower bound of the time of a query of a pass, ns, from counters alone.
     ///
-    /// The same in every run, and far below the real time of most structures.
+    /// Deterministic, and far below the real time of most structures.
     pub(super) fn least_ns(&self, pass: Pass) -> f64 {
         let queries = self.answers[pass as usize].len().max(1) as f64;
         20.0 + 0.1 * self.costs[pass as usize].comparisons() as f64 / queries
@@ -70,8 +70,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Counts and verifies all queries of all subjects.
 ///
-/// One reference answer serves all subjects. A subject that fails once, or was not built,
-/// is skipped.
+/// All subjects share one reference answer. A subject that fails once, or was not built, is
+/// skipped.
 pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> Vec<Counted> {
     let fresh = |subject: &Subject| Counted {
         verdict: subject.built.as_ref().err().cloned().unwrap_or_default(),
@@ -96,12 +96,13 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 let (true, Ok(built)) = (counted.verdict.is_ok(), &subject.built) else {
                     continue;
                 };
-                // Of a twin too: whichever ends the process is not tried again.
+                // Twins too, under the same name: if either ends the process, neither is tried
+                // again.
                 notice(Some(&subjects[i].spec.label), "counting");
                 let start = Instant::now();
                 let cost = &mut counted.costs[pass as usize];
                 let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));
-                // The timed traversal is compiled without the recorder: checked as well.
+                // The timed traversal is compiled without the recorder: it is checked as well.
                 let timed = |out: &mut Vec<ItemId>| built.answer(workload, pass, n, out);
                 let answered = counting.map(drop);
                 let answered = answered.and_then(|()| trial.ask(timed).map(drop));
@@ -140,8 +141,9 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
     all
 }
 
-/// Compares the answers of one batch of all points with the answers of each point
-/// alone, which were compared with the reference.
+/// Compares the batched answers of all points with those of single points.
+///
+/// The latter were compared with the reference.
 fn compare_batch(workload: &Workload, subject: &Built) -> Result<(), Verdict> {
     let (mut many, mut alone) = (Located::default(), Vec::new());
     let index = subject.regions();
@@ -161,9 +163,9 @@ fn compare_batch(workload: &Workload, subject: &Built) -> Result<(), Verdict> {
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Judged {
-    /// Cameras that were judged, evenly spread over the path.
+    /// Number of cameras checked, evenly spread over the path.
     pub judged_queries: usize,
-    /// Sums over those.
+    /// Sums over those cameras.
     #[serde(flatten)]
     pub errors: ErrorCount,
     /// The 95 % interval of the false positives per visible item, by camera.
@@ -183,14 +185,14 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
     Judged::of(found.collect())
 }
 
-/// Queries that are judged, evenly spread.
+/// The queries to check, evenly spread.
 ///
 /// Their number is from 1 to 16, as `most` verdicts allow.
 pub fn spread(items: usize, most: usize, queries: usize) -> impl Iterator<Item = usize> {
     evenly(queries, (most / items.max(1)).clamp(1, 16))
 }
 
-/// Errors of the answer about items, `held` as the test has them.
+/// Errors of the answer about `items`; `held` are their boxes in the test.
 pub(super) fn errors(
     workload: &Workload,
     camera: usize,
@@ -204,7 +206,7 @@ pub(super) fn errors(
 }
 
 impl Judged {
-    /// The errors of the queries that are judged.
+    /// The errors of the checked queries.
     pub(super) fn of(found: Vec<ErrorCount>) -> Judged {
         let excess = rate_of(&found, |e| [e.false_positives, e.visible]);
         Judged {
@@ -231,8 +233,8 @@ impl Judged {
 
 /// Errors with their false positives attributed to the planes or to the test.
 ///
-/// Those that boxes would have told are the sphere test's own. The exact test tells all there
-/// is to tell: those it returns of the stored boxes are its planes'.
+/// The sphere test causes all of its own. The exact test causes none: those that are not due to the
+/// stored boxes are due to its planes.
 pub fn blamed(test: CullingTest, mut errors: ErrorCount) -> ErrorCount {
     errors.by_planes = match test {
         CullingTest::Sphere => 0,
@@ -242,9 +244,9 @@ pub fn blamed(test: CullingTest, mut errors: ErrorCount) -> ErrorCount {
     errors
 }
 
-/// Adds a note to a structure that declares no scan, but works like one.
+/// Adds a note to a structure that does not declare a scan, but works like one.
 ///
-/// It tests at least 90 % of the items for at most 0.1 % visible ones.
+/// It tests at least 90 % of the items while at most 0.1 % are visible.
 fn note_scan(counted: &mut Counted, items: usize) {
     let answers = &counted.answers[Pass::Queries as usize];
     let queries = answers.len().max(1) as u64;

@@ -1,6 +1,6 @@
 //! Origin of a figure: machine, toolchain and source.
 //!
-//! A fact that cannot be found out is null, never a guess.
+//! A fact that cannot be determined is null, never a guess.
 
 use std::fs;
 use std::path::Path;
@@ -12,19 +12,19 @@ use crate::kernel::Kernel;
 use crate::scene::hex;
 use crate::shown::counted;
 
-/// The machine of a run; what the system does not tell is `None`.
+/// The machine of a run; facts that the system does not provide are `None`.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Machine {
     /// Model name of the processor.
     pub cpu: Option<String>,
-    /// SIMD features that kernels may choose by.
+    /// SIMD features by which kernels may be chosen.
     pub features: Vec<String>,
-    /// The kernel that queries ran by, of those this processor has.
+    /// The kernel of the queries, one of those that this processor runs.
     pub instruction_set: String,
     /// Logical processors that this process may use.
     pub cores: usize,
-    /// Logical processors of the whole machine, which its load is of.
+    /// Logical processors of the whole machine, to which the load refers.
     pub machine_cores: Option<usize>,
     /// Data and unified caches of the first core, innermost first.
     pub caches: Vec<Cache>,
@@ -48,7 +48,7 @@ pub struct Cache {
     pub bytes: u64,
 }
 
-/// Compiler and settings of the build; a fact that is not known is `None`.
+/// Compiler and settings of the build; unknown facts are `None`.
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Toolchain {
@@ -56,7 +56,7 @@ pub struct Toolchain {
     pub rustc: Option<String>,
     /// Target triple.
     pub target: Option<String>,
-    /// RUSTFLAGS, with blanks between.
+    /// RUSTFLAGS, separated by blanks.
     pub flags: String,
     /// Cargo profile, `release`.
     pub profile: Option<String>,
@@ -64,7 +64,7 @@ pub struct Toolchain {
     pub opt_level: Option<String>,
     /// Cargo features without `default`.
     pub features: Vec<String>,
-    /// SHA-256 of Cargo.lock: which dependencies.
+    /// SHA-256 of Cargo.lock, which pins the dependencies.
     pub lock_digest: String,
 }
 
@@ -72,7 +72,7 @@ pub struct Toolchain {
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Source {
-    /// Version of the program; of another crate's, with that of this crate.
+    /// Version of the program; for a program of another crate, also of this crate.
     pub version: String,
     /// Git commit; `None` for a build from a package.
     pub commit: Option<String>,
@@ -81,7 +81,7 @@ pub struct Source {
 }
 
 impl Machine {
-    /// This machine, with the best kernel that it runs.
+    /// This machine, with its best kernel.
     pub fn capture() -> Machine {
         let wanted = RefreshKind::nothing()
             .with_cpu(CpuRefreshKind::nothing())
@@ -103,13 +103,13 @@ impl Machine {
         }
     }
 
-    /// The same machine, asked by that kernel.
+    /// The same machine with another kernel of queries.
     pub fn by(mut self, kernel: Kernel) -> Machine {
         self.instruction_set = kernel.name().to_owned();
         self
     }
 
-    /// Sentence on a machine that was busy: half a process a core or more.
+    /// Sentence about a busy machine: a load of half a process per core or more.
     pub fn busy(&self) -> Option<String> {
         let cores = self.machine_cores.unwrap_or(self.cores);
         let load = self.load.filter(|load| *load > 0.5 * cores as f64)?;
@@ -119,7 +119,7 @@ impl Machine {
         ))
     }
 
-    /// Bytes that surely push everything else out of the caches.
+    /// Number of bytes that evict everything else from the caches.
     ///
     /// Twice the last level, at least 64 MiB.
     pub fn cache_sweep_bytes(&self) -> usize {
@@ -156,7 +156,7 @@ fn simd_features() -> Vec<String> {
     found
 }
 
-/// Linux lists a core's caches as folders; elsewhere there is nothing to read.
+/// Linux lists a core's caches as folders; other systems have no such list.
 fn caches(folder: &Path) -> Vec<Cache> {
     let read = |index: usize, name: &str| -> Option<String> {
         let text = fs::read_to_string(folder.join(format!("index{index}/{name}"))).ok()?;
@@ -175,13 +175,13 @@ fn caches(folder: &Path) -> Vec<Cache> {
     (0..8).filter_map(cache).collect()
 }
 
-/// A value that build.rs left in the environment; empty means unknown.
+/// A value that build.rs passed in the environment; empty means unknown.
 fn built_with(value: &str) -> Option<String> {
     Some(value.to_owned()).filter(|v| !v.is_empty())
 }
 
 impl Toolchain {
-    /// The facts that the build script left in this program.
+    /// The facts that the build script compiled into this program.
     pub fn capture() -> Toolchain {
         let lock = include_bytes!("../../Cargo.lock");
         let features = env!("CULLBENCH_FEATURES").split(',');
@@ -199,7 +199,7 @@ impl Toolchain {
 }
 
 impl Source {
-    /// The facts that the build script left in this program.
+    /// The facts that the build script compiled into this program.
     pub fn capture() -> Source {
         Source {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(machine(Some(5.0), Some(64)).busy(), None);
         let told = machine(Some(40.0), Some(64)).busy().unwrap();
         assert!(told.contains("40.0 on 64 cores"), "{told}");
-        // A report of before has those of the process alone.
+        // Older reports have the processors of the process alone.
         assert!(machine(Some(5.0), None).busy().is_some());
         let here = Machine::capture();
         assert!(here.machine_cores >= Some(here.cores));

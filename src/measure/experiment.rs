@@ -1,6 +1,6 @@
 //! The plan of a run, and the measurement of one scene by one process.
 //!
-//! A [`Plan`] is the same for all processes; a [`Share`] says what one process measures.
+//! All processes have the same [`Plan`]; a [`Share`] is the part that one process measures.
 
 use std::collections::BTreeMap;
 
@@ -28,21 +28,21 @@ const UPDATES_EVERY: u32 = 4;
 /// Amount of measurement: processes, rounds, times.
 #[derive(Clone, Copy, PartialEq, Debug, serde::Deserialize)]
 pub struct Effort {
-    /// Processes that the rounds are spread over; an interval needs ten.
+    /// Processes that share the rounds; an interval needs ten.
     pub processes: u32,
-    /// Rounds of a task in one process, at least and at most.
+    /// Fewest and most rounds of a task in one process.
     pub rounds: [usize; 2],
     /// CPU time of a task in one process, ns.
     pub task_ns: f64,
     /// Time in which a plain loop over all items answers the timed cameras, ns.
     ///
-    /// Decides on the number of timed cameras.
+    /// Determines the number of timed cameras.
     pub pass_ns: f64,
     /// Additional measurements.
     pub extras: Extras,
 }
 
-/// Measurements beside frustum queries.
+/// Measurements in addition to frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Extras {
@@ -91,7 +91,7 @@ pub struct Plan {
     pub scenes: Vec<PlannedScene>,
     /// Structures, all of which take part in every group.
     pub structures: Vec<StructureSpec>,
-    /// Culling tests with their arithmetic and planes, each a group of its own.
+    /// Culling tests with their arithmetic and planes, a group each.
     pub cullings: Vec<Culling>,
     /// Lens of cameras whose path has none.
     pub lens: LensDefaults,
@@ -112,8 +112,7 @@ pub struct Plan {
 impl Plan {
     /// Groups of a scene with their cullings, in the order of measurement.
     ///
-    /// Tests over boxes come before those over spheres, so that structures are built
-    /// twice at most.
+    /// Tests over boxes precede those over spheres, so that structures are built at most twice.
     pub fn groups_of(&self, scene: &PlannedScene) -> Vec<(GroupKey, Culling)> {
         let still = [String::new()];
         let motions = match self.motions.is_empty() {
@@ -141,7 +140,7 @@ impl Plan {
         groups.map(|(key, _)| key).collect()
     }
 
-    /// Keys of all groups, in the order in which they are measured.
+    /// Keys of all groups, in the order of measurement.
     pub fn groups(&self) -> Vec<GroupKey> {
         let keys_of = |scene| self.keys_of(scene);
         self.scenes.iter().flat_map(keys_of).collect()
@@ -158,10 +157,11 @@ impl Plan {
         self.groups().into_iter().flat_map(cells_of).collect()
     }
 
-    /// The queries of a path by a culling test; a refusal where another test has views.
+    /// The queries of a path with a culling test.
     ///
-    /// # Errors
-    /// No culling test of the plan has a view of every camera.
+    /// A refusal if only another test of the plan has a view of every camera.
+    ///
+    /// # Errors No culling test of the plan has a view of every camera.
     pub fn workload<'s>(
         &self,
         scene: &'s Scene,
@@ -187,12 +187,11 @@ impl Plan {
         self.effort.extras == Extras::All
     }
 
-    /// Shard `i` of `n` (from 1), a smaller plan: every n-th pair of scene and path.
+    /// Shard `i` of `n` (from 1): a plan with every n-th pair of scene and path.
     ///
     /// Structures, cache states, motions and tests of a pair stay together.
     ///
-    /// # Panics
-    /// Zero shards.
+    /// # Panics If `n` is zero.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
         let mut pair = 0;
         for scene in &mut self.scenes {
@@ -214,16 +213,16 @@ impl Plan {
         notice: Notice,
     ) -> Vec<Subject> {
         let is_due = share.process.is_multiple_of(UPDATES_EVERY) && !share.plan_only;
-        // Frames have updates of their own.
+        // Frames have their own updates.
         let has_updates = is_due && self.has_all() && self.motions.is_empty();
         let mut structures = self.structures.iter();
         let preferred = structures.find(|s| s.row.info.kind != Kind::Scan);
         let twin = preferred.or(self.structures.first());
         let once = self.structures.iter().map(|s| (s, false));
-        // A structure that has ended a process is not tried again, not as a twin either.
+        // A structure that has ended a process is not tried again, nor as a twin.
         let twin = twin.filter(|spec| self.has_all() && !share.failed.contains_key(&spec.label));
         let mut subjects: Vec<_> = once.chain(twin.map(|s| (s, true))).collect();
-        // Another order in each process: what is built first gets other pages than what follows.
+        // Another order in each process: the first build gets other memory pages than later ones.
         let first = share.process as usize % subjects.len().max(1);
         subjects.rotate_left(first);
         let built = subjects.into_iter().map(|(spec, is_twin)| {
@@ -248,7 +247,7 @@ impl Plan {
     }
 }
 
-/// Why a scene could not be measured.
+/// The reason why a scene could not be measured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
@@ -258,12 +257,12 @@ pub enum ExperimentError {
     /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),
-    /// A plan that measures nothing, or not what it says.
+    /// A plan that measures nothing, or is inconsistent.
     #[error("the plan has {0}; expected one or more of everything, finite times, one process")]
     Plan(&'static str),
 }
 
-/// The groups of one scene that one process measures, and what it starts from.
+/// The groups of one scene that one process measures, and its starting data.
 #[derive(Clone, Default, Debug, Serialize, Deserialize)]
 pub struct Share {
     /// Number of the process; the first, 0, counts and plans for the others.
@@ -291,11 +290,10 @@ impl Share {
 
 /// Measures one process's share of one scene.
 ///
-/// Builds the structures, then measures group after group. `keep` gets each part as soon
-/// as its group is finished.
+/// Builds the structures, then measures group after group. `keep` gets each part as soon as its
+/// group is finished.
 ///
-/// # Errors
-/// A scene or a path that cannot be read or made, a camera without a view.
+/// # Errors A scene or a path that cannot be read or made, a camera without a view.
 pub fn measure_scene(
     plan: &Plan,
     planned: &PlannedScene,
@@ -309,13 +307,12 @@ pub fn measure_scene(
     measure_loaded(plan, planned, share, (&scene, &path), keep, notice)
 }
 
-/// Cameras of a path by its name, and by the scale of far that is known of it.
+/// Cameras of a path by its name, and by the known scale of far, if any.
 pub type PathOf<'a> = &'a dyn Fn(&str, Option<f64>) -> Result<CameraPath, InputError>;
 
-/// Measures one process's share of a loaded scene, as [`measure_scene`] does.
+/// Measures one process's share of a loaded scene, like [`measure_scene`].
 ///
-/// # Errors
-/// A path that cannot be read or made, a camera without a view.
+/// # Errors A path that cannot be read or made, a camera without a view.
 pub fn measure_loaded(
     plan: &Plan,
     planned: &PlannedScene,
@@ -334,7 +331,7 @@ pub fn measure_loaded(
         let known = share.known[n].as_ref();
         // Built once for all tests over boxes, and again for spheres.
         let of_spheres = culling.test == CullingTest::Sphere;
-        // The old ones go first: memory for one set is enough.
+        // Drop the old ones first: memory for one set is enough.
         drop(built.take_if(|(kind, _)| *kind != of_spheres));
         let build = || plan.subjects(scene, culling.test, share, notice);
         let (_, subjects) = built.get_or_insert_with(|| (of_spheres, build()));
@@ -361,7 +358,7 @@ pub fn measure_loaded(
             task_ns: plan.effort.task_ns,
             cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
             cold: key.cache == "cold",
-            // Other orders in each process.
+            // Different orders in each process.
             seed: plan.seed.wrapping_add(u64::from(share.process)),
             cache_bytes: sweep,
         };

@@ -1,9 +1,9 @@
 //! [`measure`]: the measurement of one group by one process, here of motions.
 //!
-//! A frame takes the moves, updates the index, and answers the queries of one or more views.
-//! Each structure replays the same motion over its own items, from a fresh build in every
-//! round; the rounds are paired and ordered as those of still scenes. In the first round
-//! every set is compared with the reference scan, in later rounds every size.
+//! A frame takes the moves, updates the index, and answers the queries of one or more views. Each
+//! structure replays the same motion over its own items, from a fresh build in every round; rounds
+//! are paired and ordered like those of still scenes. The first round compares every set with the
+//! reference scan, later rounds every size.
 
 use super::clock::Stopwatch;
 use super::group::{GroupPlan, counts, queries, task_part};
@@ -34,7 +34,7 @@ struct Entry<'a> {
     part: SubjectPart,
     /// CPU time of one replay in the count pass, ns.
     replay_ns: f64,
-    /// Times and number of returned items of each frame.
+    /// Times and number of returned items of each frame, by round.
     rounds: Vec<Vec<(Laps, u64)>>,
 }
 
@@ -76,7 +76,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
             let timed = entry.timed(key.1, workload);
             let tail_of = (key.1 == TaskKind::Frame).then_some(1);
             tasks.push(task_part(key, &timed, &planned.schedule, tail_of));
-            // Of one view the queries are the difference of the two.
+            // With one view the queries are the difference of the two.
             let is_kept = [TaskKind::Frame, TaskKind::Update].contains(&key.1)
                 || workload.views_per_frame > 1;
             let kept = timed.ok().filter(|_| is_kept).unwrap_or_default();
@@ -86,7 +86,7 @@ pub fn measure(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     if plan.process.is_multiple_of(AGES_EVERY) && !plan.plan_only {
         for entry in &mut entries {
             let Subject { spec, is_twin, .. } = entry.subject;
-            // Not where it is built again in every frame or in every n-th.
+            // Not if the policy rebuilds it in every or every n-th frame.
             let ages = spec.info().refits && spec.policy == UpdatePolicy::Refit;
             if entry.part.verdict.is_ok() && !is_twin && ages {
                 let found = guarded(|| ageing(spec, frames, &plan.protocol, notice));
@@ -143,7 +143,7 @@ impl Entry<'_> {
         self.part.memory_after_bytes = Some(moving.index.memory().total() as u64);
         let chose = moving.index.chose();
         let chose = match self.subject.spec.policy {
-            // A new build counts its own updates.
+            // A new build counts only its own updates.
             UpdatePolicy::Every(_) => chose.map(|chose| format!("since the last build: {chose}")),
             _ => chose,
         };
@@ -154,7 +154,7 @@ impl Entry<'_> {
         Ok(())
     }
 
-    /// A sample of a kind of task per frame and round; its ids are those of all views.
+    /// One sample per frame and round of a kind of task; returned ids are of all views.
     fn timed(&self, kind: TaskKind, workload: &Workload) -> Result<Timed, Verdict> {
         if !self.part.verdict.is_ok() {
             return Err(self.part.verdict.clone());
@@ -203,7 +203,7 @@ fn schedule(entries: &[Entry], frames: &Frames, protocol: &Protocol) -> KeyedSch
     KeyedSchedule { keys, schedule }
 }
 
-/// Replays the motion by the schedule.
+/// Replays the motion according to the schedule.
 fn time(entries: &mut [Entry], frames: &Frames, planned: &KeyedSchedule, plan: &GroupPlan) {
     let mut orders = Orders::new(entries.len(), plan.protocol.seed);
     for round in 0..planned.schedule.rounds {

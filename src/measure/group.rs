@@ -1,8 +1,8 @@
 //! The measurement of one group by one process: [`queries`] of a still scene.
 //!
-//! The first process counts, checks with the oracle, makes the schedules, and times. The
-//! others compare the digests of answers with those of the first, and time by its schedules.
-//! The group as a result, [`Group`](super::Group), is in `results`.
+//! The first process counts, checks with the oracle, makes the schedules, and times. The others
+//! compare the digests of answers with those of the first, and time by its schedules. The group as
+//! a result, [`Group`](super::Group), is in `results`.
 
 use std::collections::BTreeMap;
 
@@ -20,22 +20,22 @@ use crate::kernel::Kernel;
 use crate::query::QueryCost;
 use crate::statistics::{interquartile_mean, median};
 
-/// Reason of what is left out of a scene without items.
+/// Reason of omissions in a scene without items.
 pub const NO_ITEMS: &str = "the scene has no items: there is nothing to time";
 /// Fewest groups of cameras for quantiles of the query time.
 pub(super) const LEAST_TAIL: usize = 20;
 
 /// Settings of the measurement of one group by one process.
 pub struct GroupPlan<'a> {
-    /// The scene, as reports have it.
+    /// The scene, in the form of reports.
     pub scene: &'a SceneInfo,
-    /// The path, as reports have it.
+    /// The path, in the form of reports.
     pub path: PathInfo,
     /// Number of this process; 0 counts and plans.
     pub process: u32,
     /// Rounds and times of the timed pass.
     pub protocol: Protocol,
-    /// Lower bounds to be timed beside the structures.
+    /// Lower bounds timed beside the structures.
     pub bounds: &'a [Bound],
     /// Answers and schedules of the first process; `None` in that process.
     pub known: Option<&'a Known>,
@@ -43,12 +43,12 @@ pub struct GroupPlan<'a> {
     pub plan_only: bool,
     /// True if region search is timed as well.
     pub locate: bool,
-    /// Gets each step.
+    /// Callback for each step.
     pub notice: Notice<'a>,
 }
 
 impl<'a> GroupPlan<'a> {
-    /// The plan of a process that is alone, for warm or cold caches.
+    /// The plan of a single process, for warm or cold caches.
     ///
     /// It times region search as well, and no lower bounds.
     pub fn new(workload: &Workload, scene: &'a SceneInfo, protocol: Protocol) -> GroupPlan<'a> {
@@ -70,8 +70,9 @@ impl<'a> GroupPlan<'a> {
         self.known.filter(|known| !known.visible.is_empty())
     }
 
-    /// The part of this process without results; with its answers and schedules where
-    /// none were known.
+    /// The part of this process without results.
+    ///
+    /// With its answers and schedules if none were known.
     pub(super) fn part(
         self,
         workload: &Workload,
@@ -131,7 +132,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
         bounds.extend(labels.filter(|label| is_bound(label)).cloned());
         let given = plan.known.and_then(|known| known.pass(pass).0);
         let mut protocol = plan.protocol;
-        // Region search gets less, because structures are ranked by frustum queries.
+        // Region search gets less time, because structures are ranked by frustum queries.
         protocol.task_ns *= [1.0, 1.0 / 3.0][pass as usize];
         let (planned, asked) = scheduled(asked, given, workload.views.len(), &protocol);
         let (keys, schedule) = (&planned.keys, &planned.schedule);
@@ -144,7 +145,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
             false => timed(&asked, schedule, &plan.protocol, &turn),
         };
         let alone = keys.iter().zip(&schedule.tasks);
-        // Lower bounds take a part of a query's time, and so have larger batches.
+        // Lower bounds take less time than a query, and so have larger batches.
         let is_alone = |(label, kind): &TaskKey| *kind != TaskKind::Views && !is_bound(label);
         let alone = alone.filter(|(key, _)| is_alone(key));
         let largest = alone.map(|(_, task)| task.batch).max().unwrap_or(1) as usize;
@@ -172,7 +173,7 @@ pub fn queries(workload: &Workload, subjects: &[Subject], plan: GroupPlan) -> Me
     (part, samples)
 }
 
-/// The tasks of a pass: those of all structures that are right, then lower bounds.
+/// The tasks of a pass: those of all right structures, then lower bounds.
 fn tasks_of<'a>(
     workload: &'a Workload,
     entries: &[Entry<'a>],
@@ -188,8 +189,8 @@ fn tasks_of<'a>(
             };
             let least_ns = entry.counted.as_ref().map(|c| c.least_ns(pass));
             let spec = &entry.subject.spec;
-            // Views are shared where builds are, unless each is shared already. One sweep
-            // for all of them would compare warm views with cold queries.
+            // Views are shared if builds are, unless each query is shared already. One sweep for
+            // all of them would compare warm views with cold queries.
             let are_shared = spec.execution.threads > 1 && spec.query_threads() < 2;
             if kind == TaskKind::Views && (!are_shared || plan.protocol.cold) {
                 continue;
@@ -209,7 +210,7 @@ fn tasks_of<'a>(
     tasks
 }
 
-/// The times of a task, from its samples; a tail of groups of `largest` cameras.
+/// The times of a task, from its samples; tail by groups of `largest` cameras.
 pub(super) fn task_part(
     key: &TaskKey,
     result: &Result<Timed, Verdict>,
@@ -232,8 +233,8 @@ pub(super) fn task_part(
 
 /// CPU ns per query of each group of `largest` consecutive timed cameras.
 ///
-/// The median over the rounds of the mean of a group; `largest` is the largest batch of
-/// all tasks, so that the groups are the same for all.
+/// The median over the rounds of a group's mean; `largest` is the largest batch of all tasks, so
+/// that the groups are the same for all.
 fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
     let position: BTreeMap<u32, usize> = schedule.cameras.iter().copied().zip(0..).collect();
     let mut groups: BTreeMap<usize, BTreeMap<u32, (f64, f64)>> = BTreeMap::new();
@@ -255,13 +256,13 @@ type Count<'a> = (Vec<Entry<'a>>, Option<Judged>, [Vec<Answer>; 2]);
 
 /// Compares all answers with the reference, and the reference with the oracle.
 ///
-/// The right answers are those of the first structure that is right; none if none is.
+/// The right answers are those of the first right structure; empty if there is none.
 fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Count<'a> {
     let counted = count_pass(workload, subjects, notice);
     let judged = judge(workload, MOST_JUDGED);
     // All right answers are the same set, and so are its errors.
     let of_all = match workload.scene.items.is_empty() {
-        // Among no items nothing is found faster.
+        // Without items no structure is faster.
         true => Some(Verdict::new(Status::LeftOut, NO_ITEMS)),
         false => judged.unsafe_verdict(),
     };
@@ -285,7 +286,7 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
     (entries, Some(judged), right.unwrap_or_default())
 }
 
-/// Compares the answers for all cameras of the schedules with the first process's.
+/// Compares the answers for all scheduled cameras with the first process's.
 ///
 /// The first process has compared its answers with the reference.
 fn compare_digests(

@@ -1,6 +1,6 @@
 //! [`Subject`]: a structure under test, built over its own copy of the data.
 //!
-//! No other structure warms its data. Times the build and updates after items have moved; a
+//! So no other structure warms its data. Times the build and updates after items have moved; a
 //! panic becomes a verdict.
 
 use super::clock::Stopwatch;
@@ -15,27 +15,27 @@ use crate::scene::Scene;
 
 /// A structure with its two indexes: over the items and over the regions.
 ///
-/// The first answers what the camera sees, the second where the camera is.
+/// The first returns what the camera sees, the second where the camera is.
 #[derive(Debug)]
 pub struct Subject {
     /// Structure, parameters, kernel and threads.
     pub spec: StructureSpec,
-    /// True for the second copy of a structure, which must be as fast as the first.
+    /// True for the second copy of a structure, which should be as fast as the first.
     pub is_twin: bool,
-    /// The indexes, or why there are none.
+    /// The indexes, or the reason why there are none.
     pub built: Result<Built, Verdict>,
 }
 
 /// The indexes of a structure over one scene.
 #[derive(Debug)]
 pub struct Built {
-    /// Over the items, as the culling test has them.
+    /// Index over the items in the form that the culling test needs.
     pub items: Box<dyn DynIndex>,
-    /// `None` where the regions are the items as they are indexed.
+    /// Index over the regions; `None` if these are the indexed items.
     regions: Option<Box<dyn DynIndex>>,
     /// CPU time of one build over the items, ms.
     ///
-    /// Wall time where builds have several threads.
+    /// Wall time if builds have several threads.
     pub build_ms: f64,
     /// Memory of the index over the items.
     pub memory: MemoryUsage,
@@ -75,10 +75,10 @@ impl Built {
     }
 }
 
-/// Ending of a twin's label.
+/// Suffix of a twin's label.
 pub(super) const TWIN: &str = "#twin";
 
-/// A label without the ending of a twin.
+/// A label without the suffix of a twin.
 pub(super) fn original(label: &str) -> &str {
     label.strip_suffix(TWIN).unwrap_or(label)
 }
@@ -87,7 +87,7 @@ pub(super) fn original(label: &str) -> &str {
 const AGAIN_BELOW_MS: f64 = 50.0;
 
 impl Subject {
-    /// Builds the structure over the items as a culling test has them.
+    /// Builds the structure over the items in the form that a culling test needs.
     ///
     /// A panic or a refusal becomes its verdict.
     pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene, test: CullingTest) -> Subject {
@@ -99,7 +99,7 @@ impl Subject {
         }
     }
 
-    /// Measures updates as well, on another index that is then thrown away.
+    /// Also measures updates, on another index that is then dropped.
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         if let Ok(built) = &mut self.built {
             let update = || measure_update(&self.spec, scene, test);
@@ -125,15 +125,15 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     let build = || {
         let watch = Stopwatch::start();
         let built = spec.build(input_for(test, scene, &items));
-        // This thread's CPU time says nothing about what others did for it.
+        // This thread's CPU time does not include other threads' work.
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;
         built.map(|index| (index, if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6))
     };
     let (mut index, mut build_ms) = build()?;
     if build_ms < AGAIN_BELOW_MS {
-        // The first one has paid for memory that was never touched. Never two
-        // at once: a large scene would not fit twice.
+        // The first build has paid for memory that was never touched. Never two at once: a large
+        // scene would not fit twice.
         drop(index);
         (index, build_ms) = build()?;
     }
@@ -149,14 +149,14 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     })
 }
 
-/// Share of the items that move in the update that is measured.
+/// Share of the items that move in the measured update.
 const UPDATE_SHARE: f64 = 0.01;
-/// Largest scene whose updates are measured: they need a second copy of it.
+/// Most items of a scene whose updates are measured: they need a second copy of it.
 pub(super) const MOST_UPDATED: usize = 2_000_000;
 
 /// CPU time of an update after [`UPDATE_SHARE`] of the items have moved, ms.
 ///
-/// They move by their own size. Of two updates the second counts, as of builds. A search after
+/// They move by their own size. Of two updates the second counts, as with builds. A search after
 /// them is checked.
 fn measure_update(
     spec: &StructureSpec,

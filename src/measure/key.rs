@@ -13,9 +13,9 @@ pub struct GroupKey {
     pub cache: String,
     /// Name of the culling test.
     pub test: String,
-    /// Name of the arithmetic that the test is carried out in.
+    /// Arithmetic of the culling test.
     pub arithmetic: String,
-    /// Name of the method that planes are derived by.
+    /// Name of the method that derives the planes.
     pub planes: String,
     /// Factor c of the planes' epsilon.
     pub epsilon: f64,
@@ -25,7 +25,7 @@ pub struct GroupKey {
 }
 
 impl GroupKey {
-    /// Text that is equal for equal keys, as a key of maps.
+    /// Text that is equal for equal keys, as a map key.
     pub fn id(&self) -> String {
         let mut key = self.clone();
         // Zero has two signs and one meaning. Old reports have an epsilon with f64.
@@ -36,7 +36,7 @@ impl GroupKey {
         serde_json::to_string(&key).unwrap_or_default()
     }
 
-    /// The path in samples.csv, with the motion.
+    /// The path column of samples.csv, with the motion.
     pub fn samples_path(&self) -> String {
         match self.motion.as_str() {
             "" => self.path.clone(),
@@ -48,7 +48,7 @@ impl GroupKey {
 /// Key of a cell: a structure in a group.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
-    /// Group that the cell is compared within.
+    /// Group within which the cell is compared.
     #[serde(flatten)]
     pub group: GroupKey,
     /// Label of the structure, `bvh:leaf=4`.
@@ -62,7 +62,7 @@ named! {
     pub enum TaskKind {
         /// Frustum query: the items that the camera sees.
         Query = "query",
-        /// Region search: the regions that hold the camera.
+        /// Region search: the regions that contain the camera.
         Locate = "locate",
         /// Region search of all cameras of the path in one batch.
         LocateBatched = "locate_batched",
@@ -78,7 +78,7 @@ named! {
 }
 
 named! {
-    /// The two passes of a group, each counted and timed by itself.
+    /// The two passes of a group, counted and timed separately.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
     pub(super) enum Pass {
         /// Frustum queries, one per camera; lower bounds take part.

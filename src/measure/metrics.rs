@@ -4,7 +4,7 @@ use super::process_result::SubjectPart;
 use super::{Judged, TaskKind};
 use crate::statistics::Estimate;
 
-/// One metric of the list; the unit is part of its name where it has one.
+/// One metric of the list; a unit in its name is that of its values.
 pub struct MetricInfo {
     /// Name in reports and for `--metric`.
     pub name: &'static str,
@@ -23,7 +23,7 @@ pub(super) enum Of {
     Judged(fn(&Judged) -> Option<Estimate>),
     /// Mean over the processes of positive values.
     Process(fn(&SubjectPart) -> Option<f64>),
-    /// The same, of logarithms of any sign.
+    /// Mean over the processes of logarithms of any sign.
     Log(fn(&SubjectPart) -> Option<f64>),
     /// Bytes in the first process that has them, per item.
     Bytes(fn(&SubjectPart) -> Option<u64>),
@@ -37,13 +37,13 @@ pub(super) enum Of {
     Tail(f64),
     /// The slowest frame.
     WorstFrame,
-    /// Time of the yardstick / own time, of a task or of the one that ranks.
+    /// Time of the yardstick / own time, of a task or of the one ranked by.
     Speedup(Option<TaskKind>),
     /// Own time / time of a lower bound.
     Over(&'static str),
-    /// Queries after which the build is repaid.
+    /// Number of queries after which the build is repaid.
     BreakEven,
-    /// Cells of other scenes: the report as a whole has it.
+    /// Derived from cells of other scenes, by the report as a whole.
     Report,
 }
 

@@ -88,7 +88,7 @@ pub(crate) use workload::input_for;
 pub use workload::{Workload, WorkloadError, input_of};
 
 named! {
-    /// Ending of a cell. A gap is never silent.
+    /// Outcome of a cell. Gaps are always explicit.
     #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
     #[cfg_attr(test, derive(schemars::JsonSchema))]
     #[serde(rename_all = "snake_case")]
@@ -97,7 +97,7 @@ named! {
         /// Every answer equals the reference.
         #[default]
         Ok = "ok",
-        /// An answer holds ids it should not, or one twice.
+        /// An answer contains ids it should not, or one twice.
         Wrong = "wrong",
         /// An answer lacks ids: false negatives.
         Unsafe = "unsafe",
@@ -105,9 +105,9 @@ named! {
         Refused = "refused",
         /// Not run, for a stated reason.
         LeftOut = "left_out",
-        /// Said nothing for as long as `--timeout` allows.
+        /// No progress for as long as `--timeout` allows.
         TimedOut = "timed_out",
-        /// The structure's own code did, and ended its process or not.
+        /// The structure's own code panicked, whether or not the process ended.
         Panicked = "panicked",
         /// The system ended its process, or refused it memory.
         OutOfMemory = "out_of_memory",
@@ -133,14 +133,14 @@ impl Status {
 /// Result of a check: a status with its reason.
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
-    /// How it ended.
+    /// The status.
     pub status: Status,
-    /// Why, in one line; `None` for [`Status::Ok`].
+    /// Reason, in one line; `None` for [`Status::Ok`].
     pub reason: Option<String>,
 }
 
 impl Verdict {
-    /// The verdict on a fault, told behind its place.
+    /// The verdict on a fault, described after its place.
     pub fn of(fault: &Fault, place: &str, explain: impl FnOnce(usize) -> Option<String>) -> Self {
         let told = fault.explained(explain);
         Verdict::new(Status::of(fault), format!("{place}{told}"))
@@ -200,6 +200,6 @@ pub const TIMING: &str = "timing";
 
 /// Callback that gets each step of a process, for progress and time limits.
 ///
-/// Its arguments are the structure, `None` for steps without one, and the step. A step that
-/// takes long is repeated.
+/// Its arguments are the structure, `None` for steps without one, and the step. A long step is
+/// reported repeatedly.
 pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);

@@ -1,4 +1,4 @@
-//! One structure on its way through the frames of a motion.
+//! One structure during a replay of a motion.
 //!
 //! Updates, queries, checks of answers, clock readings; queries of old trees and new ones.
 
@@ -32,12 +32,12 @@ pub(super) struct Frames<'w> {
     pub(super) motion: &'w Motion,
     /// Answers of all queries, frame by frame.
     pub(super) right: Vec<Answer>,
-    /// Errors of the first answers of some frames, about the boxes there.
+    /// Errors of the first answers of some frames, against the boxes of these frames.
     pub(super) judged: Option<Judged>,
 }
 
 impl<'w> Frames<'w> {
-    /// The right answers by the scan, unless they are known.
+    /// The right answers by a scan, unless they are known.
     pub(super) fn new(
         workload: &'w Workload<'w>,
         motion: &'w Motion,
@@ -66,7 +66,7 @@ impl<'w> Frames<'w> {
                 shown.advance_written(&mut boxes, &mut written);
             }
             if let Some((n, _)) = due.next_if(|(_, due)| *due == frame) {
-                // Each view of a frame in turn.
+                // The views of a frame in turn.
                 let camera = (frame * views + n % views) % workload.cameras.len();
                 let written = Originals::listed(&written);
                 let seen = &workload.cameras[camera];
@@ -113,16 +113,16 @@ impl<'w> Frames<'w> {
     }
 }
 
-/// A structure with its own items, on its way through the frames.
+/// A structure with its own items, at some frame of the motion.
 pub(super) struct Moving<'w> {
     workload: &'w Workload<'w>,
     spec: &'w StructureSpec,
     replay: Replay<'w>,
-    /// Bounds as the culling test has them indexed.
+    /// Bounds in the form that the culling test indexes.
     items: Vec<Aabb>,
     moved: Vec<ItemId>,
     frame: u32,
-    /// Number of updates that were new builds because the structure refused a refit.
+    /// Number of updates that became rebuilds because the structure refused a refit.
     pub(super) refused: usize,
     pub(super) index: Box<dyn DynIndex>,
 }
@@ -133,7 +133,7 @@ impl<'w> Moving<'w> {
         let items = workload.items.to_vec();
         let mut index = spec.build(workload.input(&items))?;
         if spec.info().refits && spec.policy != UpdatePolicy::Rebuild {
-            // Tables of positions are no part of the first frame.
+            // Tables of positions are not part of the first frame.
             index.refit(&items, &[]);
         }
         Ok(Moving {
@@ -150,7 +150,7 @@ impl<'w> Moving<'w> {
 
     /// Takes the moves of the next frame and returns its number, from 0.
     ///
-    /// `None` after the last one.
+    /// `None` after the last frame.
     pub(super) fn take_moves(&mut self) -> Option<usize> {
         let moved = advance(&mut self.replay, self.workload, &mut self.items)?;
         self.moved.clear();
@@ -181,7 +181,7 @@ impl<'w> Moving<'w> {
     }
 }
 
-/// Writes the next frame as the culling test has the items; returns the movers.
+/// Writes the next frame in the form of the culling test; returns the movers.
 fn advance<'r>(
     replay: &'r mut Replay<'_>,
     workload: &Workload,
@@ -198,7 +198,7 @@ fn advance<'r>(
 /// Update, first query and further queries of a frame.
 pub(super) type Laps = [Lap; 3];
 
-/// CPU and wall ns of a kind; of a further query their mean. Above zero.
+/// CPU and wall ns of a kind; for further queries their mean. Positive.
 pub(super) fn times_of(laps: &Laps, kind: TaskKind, workload: &Workload) -> [f64; 2] {
     let further = workload.views_per_frame.saturating_sub(1).max(1) as f64;
     [|lap: &Lap| lap.cpu_ns, |lap: &Lap| lap.wall_ns].map(|clock| {
@@ -226,7 +226,7 @@ pub(super) fn replay(
     let mut all = Vec::with_capacity(frames.motion.frames);
     let all_threads = spec.is_threaded();
     let clock = Stopwatch::empty_lap(all_threads);
-    // Memory of answers and traversals is no part of the first frame.
+    // Memory of answers and traversals is not part of the first frame.
     for ((_, view), out) in frames.views(0).zip(&mut outs) {
         moving.index.query(view.as_any(), out);
     }
@@ -262,8 +262,7 @@ pub(super) fn replay(
 
 /// ln of (query time / query time on a fresh build of the same boxes), by frame.
 ///
-/// # Errors
-/// An answer that differs from the reference scan's.
+/// # Errors An answer that differs from the reference scan's.
 pub(super) fn ageing(
     spec: &StructureSpec,
     frames: &Frames,
@@ -281,7 +280,7 @@ pub(super) fn ageing(
         if moving.refused > 0 {
             break;
         }
-        // A structure that chooses goes by its queries, too.
+        // The choice of an adaptive structure depends on its queries, too.
         if moving.index.chose().is_some() {
             for (_, view) in frames.views(frame) {
                 out.clear();

@@ -1,6 +1,6 @@
 //! Times of the tasks of a study, in one process and over several.
 //!
-//! Values, ratios and orders by the estimators of a run, which has `results` instead.
+//! Values, ratios and orders by the estimators of a run (for runs, `results` has them).
 
 use std::borrow::Borrow;
 
@@ -11,12 +11,12 @@ use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
 
 /// Times of the tasks of a schedule in one process, in the order of the schedule.
 ///
-/// Plain data that goes from process to process.
+/// Plain data, passed between processes.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ProcessTimes {
-    /// Per task: ln of the CPU ns per query; nothing where no camera is timed.
+    /// Per task: ln of the CPU ns per query; `None` if no camera is timed.
     pub ln_ns: Vec<Result<Option<f64>, Verdict>>,
-    /// Groups of cells that are measured beside the tasks.
+    /// Groups of cells measured beside the tasks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<Part>,
 }
@@ -35,22 +35,21 @@ impl ProcessTimes {
 
 /// Times of the same tasks in several processes, by the keys of the tasks.
 ///
-/// A key is the position in the schedule, or a value of the study's own.
+/// A key is the index in the schedule, or a value defined by the study.
 pub struct OverProcesses<K = usize> {
     keys: Vec<K>,
     /// Per task, ln ns in each process.
     ///
     /// Empty without times; the verdict of the first process in which the task failed.
     logs: Vec<Result<Vec<f64>, Verdict>>,
-    /// The first task with times: what slows it slows all.
+    /// The first task with times: a slowdown of a process slows all tasks.
     reference: Vec<f64>,
 }
 
 impl OverProcesses {
-    /// The times of tasks by their positions in the schedule.
+    /// The times of tasks by their indices in the schedule.
     ///
-    /// # Panics
-    /// If the processes have not timed the same tasks.
+    /// # Panics If the processes have not timed the same tasks.
     pub fn of(processes: &[ProcessTimes]) -> OverProcesses {
         let tasks = processes.first().map_or(0, |first| first.ln_ns.len());
         OverProcesses::keyed((0..tasks).collect(), processes)
@@ -104,7 +103,7 @@ impl<K: PartialEq> OverProcesses<K> {
 
     /// ln of the time of a task in each process, ns.
     ///
-    /// All brought to the speed that [`Self::ns`] shows; empty without times.
+    /// Normalised to the reported value of [`Self::ns`]; empty without times.
     pub fn ln_ns(&self, task: impl Borrow<K>) -> Vec<f64> {
         let speed = one_run(&self.reference, &self.reference);
         let speed = speed.map_or(f64::NAN, |found| found.value.ln());
@@ -115,12 +114,12 @@ impl<K: PartialEq> OverProcesses<K> {
 
     /// Time of `task` / time of `other`.
     ///
-    /// The ratio of the two that [`Self::ns`] gives.
+    /// The ratio of the two values of [`Self::ns`].
     pub fn ratio(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> Option<Estimate> {
         ratio(&self.reference, self.own(task), self.own(other))
     }
 
-    /// Returns true if the processes show a task to be faster than another.
+    /// Returns true if a task is significantly faster than another.
     pub fn is_faster(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> bool {
         is_less(&self.ln_ns(task), &self.ln_ns(other), ALPHA)
     }
@@ -138,8 +137,7 @@ mod tests {
         }
     }
 
-    /// Processes on a machine of two speeds; the third task is as fast as the
-    /// second on the mean.
+    /// Processes on a machine of two speeds; the second and third tasks have one mean.
     fn processes() -> Vec<ProcessTimes> {
         let one = |n: usize| {
             let speed = 5.0 + if n.is_multiple_of(3) { 0.6 } else { 0.0 };
@@ -155,7 +153,7 @@ mod tests {
         let [a, b, c] = [0, 1, 2].map(|task| times.ns(task).unwrap());
         let ratio = times.ratio(1, 0).unwrap();
         assert!((ratio.value - b.value / a.value).abs() < 1e-12);
-        // The speeds of the machine are in the times and not in the ratio.
+        // The speeds of the machine affect the times and not the ratio.
         let ends = |e: Estimate| (e.lower.unwrap(), e.upper.unwrap());
         let ((low, high), (lower, upper)) = (ends(a), ends(ratio));
         assert!(high / low > 1.4 && upper / lower < 1.02);

@@ -1,7 +1,7 @@
 //! [`Part`]: the results of one process for one group of cells.
 //!
-//! Plain data that goes from process to process and into the stream of a run. `results`
-//! makes the cells of a report from the parts of all processes.
+//! Plain data, passed between processes and written to the stream of a run. `results` makes the
+//! cells of a report from the parts of all processes.
 
 use std::collections::BTreeMap;
 
@@ -23,19 +23,19 @@ pub struct Part {
     pub key: GroupKey,
     /// Number of the process; the first, 0, counts and plans.
     pub process: u32,
-    /// The scene, as reports have it.
+    /// The scene, in the form of reports.
     pub scene: SceneInfo,
-    /// The path, as reports have it.
+    /// The path, in the form of reports.
     pub path: PathInfo,
     /// Answers and schedules for the other processes; from the first process only.
     pub known: Option<Known>,
-    /// How the answers differ from the exact truth; the first process only.
+    /// Errors of the answers against the exact truth; the first process only.
     pub judged: Option<Judged>,
     /// Structures in the order of the plan, twins last.
     pub subjects: Vec<SubjectPart>,
     /// Structures that had ended a process on this scene before.
     ///
-    /// They are not tried again, not by a resumed run either.
+    /// They are not tried again, nor by a resumed run.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub failed: BTreeMap<String, Verdict>,
     /// Names of the lower bounds among the tasks.
@@ -47,7 +47,7 @@ pub struct Part {
 /// Results of one structure in one process; its query times are in [`TaskPart`]s.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct SubjectPart {
-    /// Label on the command line, `bvh:leaf=4`; the twin of one ends in `#twin`.
+    /// Label on the command line, `bvh:leaf=4`; a twin's ends in `#twin`.
     pub label: String,
     /// Parameters of the structure, defaults included.
     pub params: Value,
@@ -55,26 +55,26 @@ pub struct SubjectPart {
     pub kind: Kind,
     /// Origin that the structure declares.
     pub origin: Origin,
-    /// How building, counting and timing ended.
+    /// Status of building, counting and timing.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// CPU time of one build; wall time if builds share threads.
     pub build_ms: Option<f64>,
-    /// Bytes of nodes and items; `None` where nothing was built.
+    /// Bytes of nodes and items; `None` if nothing was built.
     pub memory_bytes: Option<u64>,
-    /// CPU time of an update, ms; `None` where none was measured.
+    /// CPU time of an update, ms; `None` if none was measured.
     pub update_cpu_ms: Option<f64>,
     /// Bytes after the last frame of a motion; the first process only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory_after_bytes: Option<u64>,
-    /// ln of (query time after that many frames / on a fresh build of the same boxes).
+    /// ln of (query time / query time on a fresh build), by number of frames.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub ageing_ln: BTreeMap<usize, f64>,
     /// Metrics of the count pass, means per query; the first process only.
     pub counts: BTreeMap<String, f64>,
-    /// Choice of a structure that chooses, new builds in place of refits.
+    /// Choice of an adaptive structure; rebuilds in place of refits.
     ///
-    /// Known of a motion in the first process only.
+    /// For a motion, in the first process only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chose: Option<String>,
 }
@@ -86,7 +86,7 @@ pub struct TaskPart {
     pub label: String,
     /// Kind of query.
     pub task: TaskKind,
-    /// How timing it ended.
+    /// Status of its timing.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Mean CPU ns per query over all timed cameras, for each round.
@@ -95,8 +95,7 @@ pub struct TaskPart {
     pub wall_ln_ns: Option<f64>,
     /// CPU ns per query of groups of cameras, median over the rounds.
     ///
-    /// The groups are the same for all tasks; empty below twenty of them. Of frames: of
-    /// each frame.
+    /// The groups are the same for all tasks; empty with fewer than twenty. For frames: per frame.
     pub tail_ns: Vec<f64>,
 }
 
@@ -105,20 +104,20 @@ pub struct TaskPart {
 pub struct Known {
     /// Right answer of the frustum query of every camera.
     ///
-    /// Empty if the process that gets it is to count for itself.
+    /// Empty if the receiving process must count for itself.
     pub visible: Vec<Answer>,
     /// Right answer of the region search at every eye.
     pub located: Vec<Answer>,
-    /// Schedule of frustum queries, bounds last. `None` where nothing is timed.
+    /// Schedule of frustum queries, bounds last; `None` if nothing is timed.
     pub query: Option<KeyedSchedule>,
     /// Schedule of region searches.
     pub locate: Option<KeyedSchedule>,
-    /// Scale of the lens where the path names a visible share.
+    /// Scale of the lens, if the path requests a visible share.
     pub lens_scale: Option<f64>,
 }
 
 impl Part {
-    /// A part whose structures all have this verdict, of what is not known otherwise.
+    /// A part whose structures all have this verdict; other facts are unknown.
     pub fn of_failed(key: &GroupKey, structures: &[StructureSpec], verdict: &Verdict) -> Part {
         let subjects = structures.iter();
         let subjects = subjects.map(|spec| SubjectPart::unknown(spec, verdict.clone()));

@@ -1,8 +1,7 @@
 //! [`Group::of`]: the cells of a report from the parts of all processes.
 //!
-//! Every value, interval, ratio and rank of times comes from the same quantities, the
-//! ln of the time of each structure in each process, by the estimators of
-//! [`crate::statistics`].
+//! All values, intervals, ratios and ranks of times derive from the ln of the time of each
+//! structure in each process, by the estimators of [`crate::statistics`].
 
 use std::collections::BTreeMap;
 
@@ -21,7 +20,7 @@ use crate::statistics::{
 /// Label of the structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
-/// Fewest readings of a frame: below them an interruption is the median.
+/// Fewest readings of a frame: with fewer, an interruption may be the median.
 const LEAST_READINGS: usize = 3;
 
 /// All cells of a group, and the results of lower bounds and the twin.
@@ -37,8 +36,7 @@ pub struct Group {
 impl Group {
     /// Cells of a group from its parts, one per process, the first process first.
     ///
-    /// # Panics
-    /// Without parts.
+    /// # Panics Without parts.
     pub fn of(parts: &[Part]) -> Group {
         let merged = MergedParts::of(parts);
         let first = &parts[0];
@@ -62,7 +60,7 @@ impl Group {
 /// The parts of a group, with times by structure and task.
 struct MergedParts<'p> {
     parts: &'p [Part],
-    /// The first that has loaded the scene, or else the first.
+    /// The first part that has loaded the scene, or else the first.
     loaded: &'p Part,
     /// Answers and schedules of the first process.
     known: Option<&'p Known>,
@@ -152,7 +150,7 @@ impl<'p> MergedParts<'p> {
         all.filter(move |t| t.label == label && t.task == task)
     }
 
-    /// Mean number of items returned to the timed queries: in frames the first of each.
+    /// Mean number of items returned to the timed queries; per frame the first query.
     fn visible_when_timed(&self) -> Option<f64> {
         let known = self.known?;
         let cameras = &known.query.as_ref()?.schedule.cameras;
@@ -164,7 +162,7 @@ impl<'p> MergedParts<'p> {
         Some(visible / timed as f64)
     }
 
-    /// The cell of a structure, its rank excluded, or of a lower bound.
+    /// The cell of a structure, without its rank, or of a lower bound.
     fn cell(&self, label: &str, subject: Option<&SubjectPart>) -> ReportCell {
         let first = &self.parts[0];
         let verdict = self.verdict(label);
@@ -182,7 +180,7 @@ impl<'p> MergedParts<'p> {
             params: subject.map_or(Value::Null, |subject| subject.params.clone()),
             test: first.key.test.clone(),
             status: verdict.status,
-            // The status says that it panicked.
+            // The status shows that it panicked.
             reason: verdict.reason.map(bare),
             rank: None,
             times: self.times(label),
@@ -269,8 +267,8 @@ impl<'p> MergedParts<'p> {
 
     /// Metrics of a structure or, without `subject`, of a lower bound.
     ///
-    /// Errors, builds and memory only if the answers are not right. A missing or
-    /// infinite value is absent, never 0 and never NaN.
+    /// Only errors, builds and memory if the answers are not right. A missing or infinite value is
+    /// absent, never 0 and never NaN.
     fn metrics(
         &self,
         label: &str,
@@ -336,7 +334,7 @@ impl<'p> MergedParts<'p> {
 
     /// Median times of each group of cameras or each frame, ns, ascending.
     ///
-    /// Brought to the time that is shown, which has another estimator: their mean is that time.
+    /// Scaled so that their mean is the reported time, which has another estimator.
     fn tail(&self, label: &str, task: TaskKind) -> Option<Vec<f64>> {
         let shown = self.ns(label, task)?.value;
         let tails: Vec<&[f64]> = self.tasks(label, task).map(|t| &t.tail_ns[..]).collect();
@@ -347,8 +345,9 @@ impl<'p> MergedParts<'p> {
         Some(all.iter().map(|ns| ns / mean * shown).collect())
     }
 
-    /// Queries after which the build is repaid against the yardstick; `None` if never,
-    /// or if it is not shown to be faster.
+    /// Number of queries after which the build is repaid against the yardstick.
+    ///
+    /// `None` if never, or if the structure is not shown to be faster.
     fn break_even(&self, label: &str) -> Option<f64> {
         let cost = |label: &str| -> Option<[f64; 2]> {
             let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;
@@ -363,7 +362,7 @@ impl<'p> MergedParts<'p> {
         is_faster.then(|| (price.max(0.0) / gain).ceil())
     }
 
-    /// Time of `label` / time of `other`, equal to the ratio of the two shown values.
+    /// Time of `label` / time of `other`, equal to the ratio of the reported values.
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
         let [reference, own] = self.paired(label, self.ranked())?;
         ratio(reference, own, self.ln_ns(other, self.ranked())?)

@@ -1,9 +1,9 @@
 //! Schedule of a timed pass: cameras, queries per clock reading, order of tasks.
 //!
-//! The first process of a run makes it from a [`Protocol`]; all others use the same one, and
-//! so do both sides of a comparison. Tasks have keys ([`TaskKey`]): times are found by key,
-//! never by position. Orders ([`Orders`]) are balanced, so that neither a position nor a
-//! neighbour favours a task.
+//! The first process of a run makes it from a [`Protocol`]; all others use the same one, and so do
+//! both sides of a comparison. Tasks have keys ([`TaskKey`]): times are found by key, never by
+//! index. Orders ([`Orders`]) are balanced, so that neither a position nor a neighbour favours a
+//! task.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,18 +17,18 @@ use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::statistics::median;
 
-/// Limits that a schedule is made within: rounds, time, cameras, cache state.
+/// Limits of a schedule: rounds, time, cameras, cache state.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Protocol {
-    /// Rounds of a task, at least and at most.
+    /// Fewest and most rounds of a task.
     pub rounds: [usize; 2],
     /// CPU time of a task in one process, warm-up included, ns.
     ///
-    /// Decides on the number of rounds between those bounds.
+    /// Determines the number of rounds within those limits.
     pub task_ns: f64,
     /// Most cameras that are timed, evenly spread over the path.
     pub cameras: usize,
-    /// True if the caches are streamed over before every query.
+    /// True if the caches are evicted before every query.
     pub cold: bool,
     /// Seed of the order of the tasks in each round.
     pub seed: u64,
@@ -38,21 +38,20 @@ pub struct Protocol {
 
 /// Upper bound of the cost of a clock reading with its loop, ns.
 ///
-/// Laps are made long enough for it. On Linux reading a thread's CPU time is a system
-/// call.
+/// Laps are made long enough for it. On Linux reading a thread's CPU time is a system call.
 pub const CLOCK_NS: f64 = 650.0;
 /// Largest share of a lap that the clock may take.
 pub const MOST_OVERHEAD: f64 = 0.01;
 /// Least time of a lap, ns.
 ///
-/// A clock reading costs up to a hundredth of it more than an empty lap. Longer ones are
-/// not made of repeated cameras, which a branch predictor learns.
+/// A clock reading costs up to a hundredth of it more than an empty lap. Longer laps do not repeat
+/// cameras, since a branch predictor learns them.
 const LEAST_LAP_NS: f64 = 5_000.0;
 /// Most cameras of a cold pass, where each query costs a sweep over memory.
 const COLD_CAMERAS: usize = 24;
-/// Fewest cameras that are timed, so that a path is more than one view.
+/// Fewest timed cameras, so that a path is more than one view.
 const LEAST_CAMERAS: usize = 8;
-/// Number of queries that the cost of a task is estimated from.
+/// Number of queries from which the cost of a task is estimated.
 const PILOT: usize = 24;
 
 /// The plan of one timed pass.
@@ -63,19 +62,19 @@ pub struct Schedule {
     pub cameras: Vec<u32>,
     /// Rounds of the pass.
     pub rounds: u32,
-    /// True if caches are emptied before each query.
+    /// True if caches are evicted before each query.
     pub cold: bool,
     /// Plan of each task.
     pub tasks: Vec<TaskPlan>,
 }
 
-/// How one task takes part.
+/// Part of one task in a pass.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TaskPlan {
-    /// Queries per clock reading; more than cameras where each is repeated.
+    /// Queries per clock reading; more than the cameras if these are repeated.
     pub batch: u32,
-    /// Takes part in every so many-th round: slow tasks in fewer.
+    /// Takes part in every n-th round, n being this number: slow tasks in fewer.
     pub every: u32,
 }
 
@@ -93,7 +92,7 @@ impl Protocol {
 
 /// Number of cameras that a plain loop over `items` items answers within `pass_ns`.
 ///
-/// It depends on no measurement, so that every run of a command times the same cameras.
+/// Does not depend on measurements, so that every run of a command times the same cameras.
 pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
     /// Time of a box in the plain loop, ns.
     const BOX_NS: f64 = 5.0;
@@ -103,15 +102,15 @@ pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
 impl Schedule {
     /// Plans a pass over `count` cameras.
     ///
-    /// Queries per clock reading follow from [`TimedTask::least_ns`] and are the same in
-    /// every run; for a task without it, from the median time of a few queries.
+    /// Queries per clock reading follow from [`TimedTask::least_ns`] and are the same in every run;
+    /// without it, from the median time of a few queries.
     pub fn new(count: usize, tasks: &[TimedTask], protocol: &Protocol) -> Schedule {
         let cameras = protocol.cameras_of(count);
         let timed = cameras.len().max(1);
         let mut out = Vec::new();
         let [least, most] = protocol.rounds;
         let plans = tasks.iter().map(|task| {
-            // A panic is the task's own result when its pass comes.
+            // A panic becomes the task's own result in its pass.
             let pilot = guarded(|| pilot(task, &cameras, &mut out)).unwrap_or(1.0);
             let enough = batch(task.least_ns.unwrap_or(pilot), timed);
             let batch = match (&task.ask_many, protocol.cold) {
@@ -141,9 +140,9 @@ impl Schedule {
         }
     }
 
-    /// Gives a twin and its original the same rounds, the most of them.
+    /// Gives a twin and its original the same rounds, the larger number of the two.
     ///
-    /// A pilot is only ever too slow, and a twin is to be measured as its original is.
+    /// A pilot only errs on the slow side, and a twin must be measured like its original.
     pub(super) fn share_rounds(&mut self, keys: &[TaskKey]) {
         let every: Vec<u32> = self.tasks.iter().map(|task| task.every).collect();
         for (task, (label, kind)) in self.tasks.iter_mut().zip(keys) {
@@ -160,7 +159,7 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     let mut queried: Vec<u32> = some.collect();
     if task.ask_many.is_some() {
         queried = cameras.to_vec();
-        // The lesser of two: the first fills caches, and either may be interrupted.
+        // The smaller of two: the first fills caches, and either may be interrupted.
         let laps = [(); 2].map(|()| {
             let watch = Stopwatch::start();
             task.ask_all(&queried, out);
@@ -185,7 +184,7 @@ fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
 
 /// Queries per clock reading: a power of two that makes the clock negligible.
 ///
-/// Or all cameras, several times where they take less than [`LEAST_LAP_NS`].
+/// At most all cameras, repeated if they take less than [`LEAST_LAP_NS`].
 fn batch(query_ns: f64, cameras: usize) -> usize {
     let queries = |ns: f64| (ns / query_ns.max(1.0)).ceil() as usize;
     let needed = queries(CLOCK_NS / MOST_OVERHEAD).next_power_of_two();
@@ -214,7 +213,7 @@ impl KeyedSchedule {
 
 /// The schedule of a timed pass, and the tasks that take part.
 ///
-/// With a `given` schedule it is the part for these tasks, without those that it does not have.
+/// With a `given` schedule, its part for these tasks; tasks that it lacks are dropped.
 pub(super) fn scheduled<'a>(
     mut tasks: Vec<(TaskKey, TimedTask<'a>)>,
     given: Option<&KeyedSchedule>,
@@ -237,11 +236,11 @@ pub(super) fn scheduled<'a>(
 
 /// Balanced orders of n tasks: a Williams square per block of n rounds.
 ///
-/// In a block every task takes every position once and follows every other task once; for
-/// odd n a block has 2n rounds, and everything occurs twice. Each block permutes the tasks
-/// at random. (E. J. Williams 1949, "Experimental designs balanced for the estimation of
-/// residual effects of treatments".) A task that follows one that streams through the
-/// caches starts worse than others, so a fixed neighbour would be a bias.
+/// In a block every task takes every position once and follows every other task once; for odd n a
+/// block has 2n rounds, and everything occurs twice. Each block permutes the tasks at random. (E.
+/// J. Williams 1949, "Experimental designs balanced for the estimation of residual effects of
+/// treatments".) A task that follows one that streams through the caches starts worse than others,
+/// so a fixed neighbour would be a bias.
 pub struct Orders {
     names: Vec<usize>,
     turn: usize,
@@ -300,7 +299,7 @@ mod tests {
         assert_eq!(cameras_within(25e6, 100_000), 50);
         assert_eq!(protocol().cameras_of(40), (0..40).collect::<Vec<_>>());
         assert_eq!(protocol().cameras_of(120)[..3], [0, 3, 6]);
-        // However large the scene, a path is never fewer than eight views.
+        // However large the scene, a path has at least eight views.
         let few = Protocol {
             cameras: 0,
             ..protocol()
@@ -323,7 +322,7 @@ mod tests {
             assert!(CLOCK_NS <= MOST_OVERHEAD * batch * ns, "{ns}");
             assert!(batch == 1.0 || CLOCK_NS > MOST_OVERHEAD * batch / 2.0 * ns);
         }
-        // The cameras once, or as often as the least lap takes.
+        // The cameras once, or as often as the least lap requires.
         assert_eq!(batch(200.0, 40), 40);
         assert_eq!((batch(20.0, 40), batch(20.0, 1)), (280, 250));
     }
@@ -341,7 +340,7 @@ mod tests {
             least_ns: Some(1e5),
         };
         let tasks = [spin(1_000), spin(300_000)];
-        // Room for forty rounds of the first, however slow its clock is.
+        // Time for forty rounds of the first, however slow its clock is.
         let protocol = Protocol {
             task_ns: 1e8,
             ..protocol()
@@ -365,7 +364,7 @@ mod tests {
     fn everyone_takes_every_place_and_follows_everyone_equally_often() {
         for (count, rounds, often) in [(2, 2, 1), (6, 6, 1), (8, 8, 1), (5, 10, 2), (9, 18, 2)] {
             let mut orders = Orders::new(count, 7);
-            // A second block, drawn again.
+            // A second block, permuted again.
             for _ in 0..2 {
                 let mut taken = vec![vec![0; count]; count];
                 let mut follows = vec![vec![0; count]; count];

@@ -13,7 +13,7 @@ pub struct Setting {
     pub scene: Scene,
     /// Cameras.
     pub path: CameraPath,
-    /// Structures to be measured.
+    /// Structures to measure.
     pub structures: Vec<StructureSpec>,
     /// Rounds and times of a process.
     pub protocol: Protocol,
@@ -29,7 +29,7 @@ pub struct StudyPlan<K> {
 }
 
 impl<K> StudyPlan<K> {
-    /// A plan of tasks, each of them with `queries` queries.
+    /// A plan of tasks with `queries` queries each.
     pub fn new(tasks: Vec<(K, TimedTask)>, queries: usize, protocol: &Protocol) -> StudyPlan<K> {
         let (keys, tasks): (Vec<_>, Vec<_>) = tasks.into_iter().unzip();
         let schedule = Schedule::new(queries, &tasks, protocol);
@@ -40,7 +40,7 @@ impl<K> StudyPlan<K> {
         }
     }
 
-    /// Times of the tasks in this process, answered by what `ask` gives for their keys.
+    /// Times of the tasks in this process; `ask` returns the query function of a key.
     pub fn timed<'a>(
         &self,
         protocol: &Protocol,

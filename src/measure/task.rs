@@ -14,7 +14,7 @@ use crate::threads::Workers;
 /// Answers the query of the camera with this index: appends ids to an empty output.
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 
-/// Answers the queries of several cameras at once; returns the number of all ids.
+/// Answers the queries of several cameras at once; returns the total number of ids.
 pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 
 /// A participant of a timed pass: its queries and the right sizes of their answers.
@@ -27,9 +27,9 @@ pub struct TimedTask<'a> {
     pub all_threads: bool,
     /// Number of ids that each query must return.
     pub expected: Vec<u64>,
-    /// Lower bound of the time of a query, ns; `None` where nothing was counted.
+    /// Lower bound of the time of a query, ns; `None` if nothing was counted.
     ///
-    /// It comes from counters, so it is the same in every run.
+    /// From counters, so it is the same in every run.
     pub least_ns: Option<f64>,
 }
 
@@ -45,7 +45,7 @@ impl<'a> TimedTask<'a> {
         }
     }
 
-    /// The task that a structure answers queries of a kind on a workload.
+    /// The task of a structure for a kind of query on a workload.
     pub(super) fn of(
         task: TaskKind,
         spec: &StructureSpec,
@@ -100,7 +100,8 @@ impl<'a> TimedTask<'a> {
 
 /// Frustum queries of several cameras, shared among threads.
 ///
-/// `None` if the system gives no threads. A thread answers one camera after another into its own list.
+/// `None` if the system creates no threads. A thread answers one camera after another into its own
+/// list.
 fn seen_at_once<'a>(
     workload: &'a Workload,
     built: &'a Built,
@@ -124,12 +125,12 @@ fn seen_at_once<'a>(
     }))
 }
 
-/// Shares of cameras per thread, so that a thread that was interrupted gets fewer.
+/// Shares of cameras per thread, so that an interrupted thread gets fewer.
 const SHARES: usize = 8;
 
 /// Region search at the eyes of several cameras in one call.
 ///
-/// The memory for points and answers is kept from call to call.
+/// The memory for points and answers is reused from call to call.
 fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> {
     let index = built.regions();
     let kept = RefCell::new((Vec::new(), Located::default(), Vec::new()));
@@ -167,7 +168,7 @@ mod tests {
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
-    /// On a map each answer is refined by its own point.
+    /// On a map each answer is refined with its own point.
     #[test]
     fn points_asked_at_once_get_their_own_answers() {
         let scene = scene::load("freedm-map12", &Default::default()).unwrap();

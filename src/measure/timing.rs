@@ -1,8 +1,8 @@
 //! The timed pass: [`timed`] times tasks by a [`Schedule`].
 //!
-//! Rounds in balanced random order over all tasks, each warmed up, with several queries per
-//! clock reading where one is short. In a cold pass the caches are streamed over before the
-//! queries of every camera, and outputs do not grow while timed.
+//! Rounds in balanced random order over all tasks, each warmed up, with several queries per clock
+//! reading if one is short. In a cold pass the caches are evicted before the queries of every
+//! camera, and outputs do not grow while timed.
 
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub struct Sample {
     pub cpu_ns: f64,
     /// Wall time per query, less the cost of the clock.
     pub wall_ns: f64,
-    /// Ids returned by all queries of the sample: each sample is a test too.
+    /// Number of ids returned by all queries of the sample: each sample is a test too.
     pub returned: u64,
 }
 
@@ -71,11 +71,10 @@ impl Timed {
 
 /// Times the tasks by a schedule; returns the samples or the failure of each task.
 ///
-/// `turn` gets the number of a task before each of its turns. A sample with another number
-/// of ids than [`TimedTask::expected`] makes its task `wrong`; a panic fails its task alone.
+/// `turn` gets the index of a task before each of its turns. A sample with another number of ids
+/// than [`TimedTask::expected`] makes its task `wrong`; a panic fails only its own task.
 ///
-/// # Panics
-/// If the schedule is of another number of tasks.
+/// # Panics If the schedule has another number of tasks.
 pub fn timed(
     tasks: &[TimedTask],
     schedule: &Schedule,
@@ -98,8 +97,7 @@ pub fn timed(
     for round in 0..schedule.rounds {
         let takes_part = |task: usize| round % schedule.tasks[task].every == 0;
         let batch = |task: usize| schedule.tasks[task].batch as usize;
-        // The first task after a sweep finds the view cold as well: a new order for each
-        // camera.
+        // The first task after a sweep finds the view cold as well: a new order for each camera.
         for first in 0..cold.as_ref().map_or(1, |_| schedule.cameras.len()) {
             cold.iter_mut().for_each(Cold::sweep_over_caches);
             for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
@@ -115,9 +113,9 @@ pub fn timed(
                     });
                     continue;
                 };
-                // Batched points come once a round.
+                // Batched points are timed once per round.
                 if first % batch == 0 {
-                    // The sweep has emptied the caches of the clock's code, too.
+                    // The sweep has evicted the clock's code, too.
                     timer.clock = Stopwatch::empty_lap(all_threads);
                     let out = &mut cold.outs[task];
                     timer.guarded(task, |t| t.time(task, round, first, batch, out));
@@ -149,7 +147,7 @@ impl TaskTimer<'_, '_> {
 
     /// Times one batch of cameras from the `first` on, unless the task has failed.
     ///
-    /// Not inlined, because scripts/check-instructions.sh counts the instructions in it.
+    /// Not inlined: scripts/check-instructions.sh counts the instructions in it.
     #[inline(never)]
     fn time(&mut self, task: usize, round: u32, first: usize, batch: usize, out: &mut Vec<ItemId>) {
         let Ok(timed) = &mut self.results[task] else {
@@ -195,13 +193,13 @@ fn warm_up(task: &TimedTask, cameras: &[u32], batch: usize, out: &mut Vec<ItemId
     }
 }
 
-/// Number of ids of spare room in an output: structures write whole rows.
+/// Spare room in an output, in ids: structures write whole rows.
 const SLACK: usize = 64;
 
-/// Sweep and outputs of cold queries.
+/// Memory sweep and outputs of cold queries.
 ///
-/// One sweep serves one query of every task: each task has its own data, which no other
-/// query loads into the caches, and its own output.
+/// One sweep serves one query of every task: each task has its own data, which no other query loads
+/// into the caches, and its own output.
 struct Cold {
     /// Memory larger than the last cache, overwritten between cold queries.
     sweep: Vec<u64>,
@@ -227,7 +225,7 @@ impl Cold {
     }
 
     fn sweep_over_caches(&mut self) {
-        // Written, not only read: shared zero pages would stay in one line.
+        // Written instead of read: all zero pages share one physical page, which evicts nothing.
         for line in self.sweep.chunks_mut(8) {
             line[0] = line[0].wrapping_add(1);
         }
@@ -250,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Returns as many ids as the camera has by `count`.
+    /// A task that returns `count(camera)` ids.
     fn task<'a>(count: impl Fn(usize) -> u64 + 'a, expected: Vec<u64>) -> TimedTask<'a> {
         TimedTask {
             ask: Box::new(move |camera, out| out.extend((0..count(camera)).map(|id| id as ItemId))),
@@ -298,7 +296,7 @@ mod tests {
         assert_eq!((timed.samples.len(), timed.samples[0].queries), (3, 40));
     }
 
-    /// Forty cameras of 20 ns, seven times, are more than the least lap.
+    /// Forty cameras of 20 ns, seven times, exceed the least lap.
     #[test]
     fn short_queries_of_few_cameras_are_repeated() {
         for is_batched in [false, true] {
@@ -353,7 +351,7 @@ mod tests {
             ask: Box::new(move |camera, _| assert!(camera < at, "deep in a peer's code")),
             ..task(|_| 0, vec![0; 40])
         };
-        // In the pass itself, and before it, when its cost is found.
+        // In the pass itself, and before it, when its cost is estimated.
         for at in [39, 0] {
             let all = [panics(40), panics(at)];
             let found = timed_rounds(&all, &protocol());
@@ -378,7 +376,7 @@ mod tests {
             wall_ns: 0.0,
             returned: 0,
         };
-        // Rounds of 100 (by one sample of 1 query and one of 3), and outliers.
+        // Rounds of 100 (from a sample of 1 query and one of 3), and outliers.
         let samples = vec![
             sample(0, 1, 40.0),
             sample(0, 3, 120.0),

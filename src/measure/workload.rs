@@ -15,14 +15,14 @@ use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, Sought};
 
-/// Input of a structure: items of a scene with the scene's own partition.
+/// Input of a structure: `items` and the scene's own partition.
 ///
-/// The items as they are, or as a culling test has them indexed.
+/// The items are the scene's, or in the form that a culling test indexes.
 pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     Input::new(items).own_tree(scene.own_tree.as_ref())
 }
 
-/// [`input_of`] with the spheres of the test that has some.
+/// [`input_of`] with spheres, if the test uses them.
 pub(crate) fn input_for<'a>(test: CullingTest, scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
     input_of(scene, items).spheres(test == CullingTest::Sphere)
 }
@@ -36,31 +36,31 @@ pub struct Workload<'a> {
     pub path: String,
     /// Test, arithmetic and planes.
     pub culling: Culling,
-    /// The scene's items as the culling test has them indexed.
+    /// The scene's items in the form that the culling test indexes.
     pub items: Cow<'a, [Aabb]>,
-    /// The cameras of the path; the truth is theirs.
+    /// The cameras of the path; the truth refers to them.
     pub cameras: Vec<Camera>,
-    /// Origin of the scene and extent of what its items cover, moved ones included.
+    /// Origin of the scene and reach of its items, moved ones included.
     pub around: Surroundings,
     /// Views that structures are queried with, one per camera.
     pub views: Vec<CameraView>,
-    /// Scale of the lens where the path names a visible share.
+    /// Scale of the lens, if the path requests a visible share.
     pub lens_scale: Option<f64>,
-    /// Eyes of the cameras in f32, as region search gets them.
+    /// Eyes of the cameras in f32, for region search.
     pub points: Vec<Vec3>,
-    /// The same eyes in f64 too, for the exact test of what an index returns.
+    /// The same eyes in f64 too, for the exact test of an index's candidates.
     pub sought: Vec<Sought>,
     /// New bounds of the items, frame by frame; `None` for a still scene.
     pub motion: Option<Motion>,
-    /// Number of queries of a frame; the frames go through the views in turns.
+    /// Number of queries per frame; the frames take the views in turn.
     pub views_per_frame: usize,
 }
 
-/// A camera of a path that has no such view.
+/// A camera of a path without such a view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{place}: {error}")]
 pub struct WorkloadError {
-    /// Place in the path ([`CameraPath::place`]), or the motion that goes too far.
+    /// Place in the path ([`CameraPath::place`]), or the motion that moves too far.
     pub place: String,
     /// Reason.
     pub error: CullingError,
@@ -69,9 +69,8 @@ pub struct WorkloadError {
 impl<'a> Workload<'a> {
     /// Makes the queries of all cameras of a path.
     ///
-    /// # Errors
-    /// A camera whose view cannot be made (its planes do not fit f32, or the
-    /// choices contradict each other); its place in the path is named.
+    /// # Errors A camera whose view cannot be made (its planes do not fit f32, or the choices
+    /// conflict); its place in the path is named.
     pub fn new(
         scene: &'a Scene,
         path: &CameraPath,
@@ -82,10 +81,9 @@ impl<'a> Workload<'a> {
 
     /// [`Workload::new`] with items that move, and `views` queries after each frame.
     ///
-    /// Recorded moves go by the times of recorded cameras ([`Motion::seen_by`]).
+    /// Recorded moves follow the times of recorded cameras ([`Motion::seen_by`]).
     ///
-    /// # Errors
-    /// The errors of [`Workload::new`].
+    /// # Errors The errors of [`Workload::new`].
     pub fn moving(
         scene: &'a Scene,
         path: &CameraPath,
@@ -127,7 +125,7 @@ impl<'a> Workload<'a> {
         })
     }
 
-    /// Input of a structure over items as the culling test has them.
+    /// Input of a structure over items in the form that the culling test indexes.
     pub(super) fn input<'i>(&'i self, items: &'i [Aabb]) -> Input<'i> {
         let input = input_for(self.culling.test, self.scene, items);
         input.come_and_go(self.motion.is_some())

@@ -62,7 +62,7 @@ fn shards_are_the_plan_and_leave_what_is_compared_together() {
         let sum: usize = shards.iter().map(Vec::len).sum();
         assert_eq!(sum, cells.len(), "nothing twice in {n} shards");
     }
-    // Six pairs: the seventh of seven shards has nothing to do.
+    // Six pairs: the seventh of seven shards is empty.
     assert!(whole.clone().shard(7, 7).scenes.is_empty());
 }
 

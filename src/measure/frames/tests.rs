@@ -14,7 +14,7 @@ use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
 use crate::scene;
 
-/// A part of a motion on a small city, with two queries per frame.
+/// A part of a motion in a small city, with two queries per frame.
 fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<&Known>) -> Part {
     let scene = scene::load("city:n=300", &Default::default()).unwrap();
     let way = path::load("orbit:frames=7", &scene, &Default::default()).unwrap();
@@ -90,7 +90,7 @@ fn frames_are_measured_as_one_thing_and_in_parts() {
         let firsts = known.visible.iter().step_by(2).map(|answer| answer.count);
         let returned = firsts.sum::<u64>() as f64 / 12.0;
         assert!((of("ns_per_visible") * returned / of("query_ns") - 1.0).abs() < 1e-9);
-        // The octree refits no items that come or go.
+        // The octree cannot refit items that come or go.
         assert_eq!(cell.value("ageing_10").is_some(), rank < 2);
         assert!(cell.value("ageing_100").is_none());
         assert!(of("memory_after_bytes_per_item") > 0.0 && of("visible_count") > 0.0);
@@ -100,7 +100,7 @@ fn frames_are_measured_as_one_thing_and_in_parts() {
             ("frame_ns", 24)
         );
     }
-    // Another first process: other answers.
+    // A first process with different answers.
     let mut other = known.clone();
     other.visible[5].digest ^= 1;
     let odd = part(
@@ -166,7 +166,7 @@ fn spheres_move_as_cubes() {
         .map(|test| part(&specs, "drift:share=0.5,frames=5", test, None).subjects);
     for (subject, of_boxes) in cubes.iter().zip(&boxes) {
         assert_eq!(subject.verdict, Verdict::default());
-        // Centre and radius beside the bounds, to the last frame.
+        // Centre and radius in addition to the bounds, up to the last frame.
         let [with, without] = [subject, of_boxes].map(|of| of.memory_after_bytes.unwrap());
         let has_spheres = own.contains(&&subject.label[..]);
         let more = with >= without + 300 * 16;
@@ -240,7 +240,7 @@ fn all_policies_are_right() {
             "{cells:?}"
         );
         assert!(cells.iter().all(|cell| cell.rank.is_some()));
-        // The tenth frame of every=5 has a new build.
+        // In the tenth frame of every=5 the tree is new.
         let aged = |n: usize, frame| cells[n].value(&format!("ageing_{frame}")).is_some();
         assert_eq!([0, 1, 2].map(|n| aged(n, 10)), [true, false, false]);
         assert!(aged(0, 1) && !aged(2, 1));
@@ -281,12 +281,12 @@ fn new_builds_in_place_of_refits_are_said() {
         noted("drift:share=0.2,frames=12"),
         std::slice::from_ref(&scalar)
     );
-    // Lanes of absent items take them when they return.
+    // Lanes reserved for absent items take them when they return.
     let spawn = noted("spawn:share=0.2,frames=12");
     assert_eq!(spawn, [("bvh".to_owned(), all), scalar]);
 }
 
-/// Boxes where f32 has steps of 0.5, and a motion that states them again.
+/// Boxes where f32 has steps of 0.5, and a motion that repeats them.
 #[test]
 fn recorded_frames_are_judged_by_the_boxes_as_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -296,7 +296,7 @@ fn recorded_frames_are_judged_by_the_boxes_as_written() {
     for n in 0..200_u32 {
         let [x, y, z] = [far(n), far(7 * n), far(31 * n)];
         let row = match n {
-            // No origin suits them all.
+            // No origin suits all of them.
             0 => "-8e6,-8e6,-8e6,-8e6,-8e6,-8e6".to_owned(),
             _ => format!("{x},{y},{z},{},{},{}", x + 0.2, y + 0.1, z + 0.05),
         };

@@ -1,4 +1,4 @@
-//! One process after the first: what it compares, and what it keeps to.
+//! Processes after the first: comparisons, and the given schedule.
 
 use super::*;
 use crate::culling::{Culling, CullingTest};
@@ -68,7 +68,7 @@ fn a_later_process_keeps_to_the_plan_of_the_first() {
         tasks.map(|t| (t.label.clone(), t.task)).collect()
     };
     assert_eq!(names(&first), names(&second));
-    // What was counted is counted once.
+    // The first process alone counts.
     assert!(!first.subjects[1].counts.is_empty() && second.subjects[1].counts.is_empty());
 }
 
@@ -123,7 +123,7 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     let queries = part.tasks.iter().filter(|t| t.task == TaskKind::Query);
     let labels: Vec<&str> = queries.map(|t| t.label.as_str()).collect();
     assert_eq!(labels, ["linear", "bvh"]);
-    // The plan names what is not here: a structure that ended a process.
+    // The schedule names an absent structure: one that ended a process.
     let part = measured("bvh", 2, Some(&known), false);
     let queries = part.tasks.iter().filter(|t| t.task == TaskKind::Query);
     assert_eq!(queries.count(), 1);
@@ -143,7 +143,7 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     assert_eq!(batches, [3], "its own, not the one in its place");
 }
 
-/// Lower bounds take a part of a query's time, and so have larger batches.
+/// Lower bounds take less time than a query, and so have larger batches.
 #[test]
 fn lower_bounds_take_no_tail_from_a_structure() {
     let scene = scene();

@@ -1,4 +1,4 @@
-//! Cells from parts that were made by hand: what is shown of them.
+//! Cells from handmade parts.
 
 use serde_json::json;
 
@@ -31,7 +31,7 @@ fn subject(label: &str, build_ms: f64) -> SubjectPart {
     }
 }
 
-/// A part of each process; builds take 1 ms for `linear`, 2 ms for all others.
+/// A part per process; builds take 1 ms for `linear`, 2 ms for all others.
 fn parts(times: &[Times]) -> Vec<Part> {
     let mut labels: Vec<&str> = times.iter().map(|(label, ..)| *label).collect();
     labels.dedup();
@@ -105,8 +105,9 @@ fn parts(times: &[Times]) -> Vec<Part> {
     (0..processes).map(part).collect()
 }
 
-/// Times of twelve processes on a machine of two speeds: `factor` times those
-/// of the yardstick, with a scatter of its own.
+/// Times of twelve processes on a machine of two speeds.
+///
+/// `factor` times those of the yardstick, with their own scatter.
 fn times(factor: f64, salt: u64) -> Vec<f64> {
     let process = |n: u64| {
         let machine = if n.is_multiple_of(3) { 1.3 } else { 1.0 };
@@ -147,7 +148,7 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
         }
         let has_interval = cell.metrics["query_ns"].lower.is_some();
         assert!(has_interval, "{}", cell.structure);
-        // One estimator: scaled by what a timed camera sees.
+        // The same estimator, scaled by the number of items that a timed camera sees.
         let [query, per_visible] = ["query_ns", "ns_per_visible"].map(|m| &cell.metrics[m]);
         let ends = |m: &super::super::Metric| [Some(m.value), m.lower, m.upper];
         let scaled = ends(query).map(|ns| ns.map(|ns| ns / IDS as f64));
@@ -158,7 +159,7 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
         assert_eq!((cell.times.processes, cell.times.rounds), (12, 3));
         assert_eq!((cell.times.cameras_timed, cell.times.batch), (4, 2));
     }
-    // The machine's speeds are in the time, and not in the ratio.
+    // The machine's speeds affect the time and not the ratio.
     let fast = &group.cells[1].metrics["speedup"];
     assert!((fast.value - 5.0).abs() < 0.05, "{fast:?}");
     assert!(fast.upper.unwrap() / fast.lower.unwrap() < 1.03, "{fast:?}");
@@ -276,7 +277,7 @@ fn a_build_breaks_even_by_the_times_that_are_shown() {
     let gain = value(linear, "query_ns") - value(fast, "query_ns");
     assert_eq!(value(fast, "break_even_queries"), (price / gain).ceil());
     assert!(!linear.metrics.contains_key("break_even_queries"));
-    // Faster, and no dearer to build.
+    // Faster, with a build that costs no more.
     let mut cheap = parts(&[
         ("linear", TaskKind::Query, &times(1.0, 1)),
         ("fast", TaskKind::Query, &times(0.2, 2)),
@@ -300,7 +301,7 @@ fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
         for name in ["query_ns_p5", "query_ns_p95", "query_ns_p99"] {
             assert_eq!(metrics.contains_key(name), groups == 20, "{name}");
         }
-        // About the mean that stands beside it, whose estimator is another one.
+        // Scaled to the reported mean, which has another estimator.
         let over_mean = |name: &str| Some(metrics.get(name)?.value / metrics["query_ns"].value);
         let wanted = (groups == 20).then_some(2000.0 / 1050.0);
         assert_eq!(over_mean("query_ns_max").is_some(), wanted.is_some());
@@ -349,7 +350,7 @@ fn without_the_yardstick_there_are_times_and_ranks_but_no_speed_ups() {
     }
 }
 
-/// Reports keep what cells rest on.
+/// The data behind cells survives in reports.
 #[test]
 fn times_of_cells_survive_json() {
     let linear = times(1.0, 1);
