@@ -1,5 +1,6 @@
-//! `cullbench advise`: the structure, the culling test and the work to leave out
-//! for a scene and path, with the evidence. The library measures and weighs it.
+//! `cullbench advise`: which structure, test and features suit a scene and path.
+//!
+//! With the evidence. The library measures and evaluates it.
 
 use anyhow::{Context, Result};
 
@@ -22,9 +23,9 @@ use crate::measure::{
 use crate::report::{Comparison, Experiment};
 use crate::suite::SUITES;
 
-/// Most cameras of a path: every rule holds views of all, some 20 KB per camera.
+/// Most cameras of a path: every rule has views of all, about 20 KB per camera.
 const MOST_CAMERAS: usize = 4096;
-/// Rounds of a task, if one process has them all.
+/// Rounds of a task if a single process does them all.
 const ROUNDS: [usize; 2] = [5, 25];
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
@@ -60,7 +61,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> Result<Ending> {
     Ok(Ending::of(!advice.found_wrong_answers()))
 }
 
-/// The plan of a run of the scene and path: a structure has the same times there.
+/// The plan of a run in which a structure has the same times as here.
 pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
     let study = &args.study;
     let list = args.moves.list(&study.structure);
@@ -84,7 +85,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> Result<Plan> {
     Ok(plan)
 }
 
-/// The inputs of the command, which tells what is left out, or of a worker.
+/// The inputs of a worker, or of the command, which reports omissions.
 fn setting(registry: &Registry, args: &AdviseArgs, timing: Option<&Timing>) -> Result<Setting> {
     let study = &args.study;
     let mut setting = load(registry, study, ROUNDS, timing, [1, 0, 0])?;
@@ -114,7 +115,7 @@ pub fn time(registry: &Registry, args: &AdviseArgs, timing: &Timing) -> Result<P
     advise::time(&input(args, &setting), &timing.plan()?)
 }
 
-/// The advice, with the evidence if it is wanted.
+/// The advice, with the evidence if requested.
 fn blocks(advice: &Advice, args: &AdviseArgs, machine: &Machine) -> Vec<Block> {
     let all_columns = args.all_columns;
     let rows = &advice.structure.rows;
@@ -155,7 +156,7 @@ fn compared(rows: &[ReportCell]) -> Comparison<'_> {
     }
 }
 
-/// Structure and test to take, in a sentence.
+/// The recommended structure and test, in a sentence.
 fn taken(advice: &Advice) -> String {
     let choice = &advice.structure;
     let Some(name) = &choice.name else {
@@ -178,7 +179,7 @@ fn taken(advice: &Advice) -> String {
     format!("Take structure {name}{lead}{test}.")
 }
 
-/// Policy to update by, with the times of a frame.
+/// The recommended update policy, with the times of a frame.
 fn in_motion(advice: &Advice) -> Option<String> {
     let motion = advice.motion.as_ref()?;
     let policy = motion.policy.as_ref()?;
@@ -202,7 +203,7 @@ fn in_motion(advice: &Advice) -> Option<String> {
     ))
 }
 
-/// From where on other structures are faster, a line per axis.
+/// Crossovers to other structures, a line per axis.
 fn changes(advice: &Advice) -> Vec<String> {
     let all = &advice.changes;
     let turns = (all.iter()).any(|own| own.below.is_some() || own.above.is_some());
@@ -228,7 +229,7 @@ fn changes(advice: &Advice) -> Vec<String> {
             let [at, lower, upper] = [turn.at, turn.lower, turn.upper].map(show);
             let structure = &turn.structure;
             let other = if side == "below" { &lower } else { &upper };
-            // No line through a tie at the workload itself.
+            // No crossover if the workload itself is a tie.
             Some(match turn.at == change.here {
                 true => format!("at {other} {structure}, at {at} a tie"),
                 false => format!("{side} {at} ({lower} to {upper}) {structure}"),
@@ -287,7 +288,7 @@ fn tie(names: &[impl AsRef<str>]) -> String {
     })
 }
 
-/// Columns of features; those from the seventh on are evidence.
+/// Columns of features; from the seventh on they are evidence.
 fn features<'o>() -> [Column<&'o Omission>; 13] {
     [
         ("feature", |rule| rule.rule.left_out.to_owned()),
@@ -332,17 +333,17 @@ fn features<'o>() -> [Column<&'o Omission>; 13] {
     ]
 }
 
-/// A time, or nothing where there is none.
+/// A time; empty if there is none.
 fn cost(ns: f64) -> String {
     some(Some(ns).filter(|ns| ns.is_finite()), text::time)
 }
 
-/// Features to use, those that tie, those to skip, and those that do not apply.
+/// Features to use, ties, features to skip, and those that do not apply.
 fn rule_table(rules: &[Omission], all_columns: bool) -> Table {
     let mut rules = rules.to_vec();
     let order = ["yes", "either", "no", ""];
     rules.sort_by_key(|rule| order.iter().position(|answer| *answer == rule.answer()));
-    // A reason that several stages share is given once.
+    // A reason shared by several stages is given once.
     for row in (1..rules.len()).rev() {
         if rules[row].answer().is_empty() && rules[row].reason == rules[row - 1].reason {
             "as above".clone_into(&mut rules[row].reason);

@@ -1,7 +1,7 @@
-//! `cullbench compare --against BINARY`: this program and another build of it,
-//! pair by pair of processes that take turns on one processor, until the change
-//! of every cell is known to within the threshold. The statistics are those of
-//! [`changes`]; here are the options and how the pairs are run.
+//! `cullbench compare --against BINARY`: this program against another build of it.
+//!
+//! Pairs of processes alternate on one processor until the change of every cell is known to within
+//! the threshold. [`changes`] has the statistics; here are the options and the execution of pairs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,12 +32,14 @@ use crate::scene;
 use crate::statistics::resolved;
 
 const SUITE: &str = "compare";
-/// Default structures, without the plain loop over all items: it takes most of the
-/// time and says least.
+/// Default structures, without the plain loop over all items.
+///
+/// The plain loop takes most of the time and is the least informative.
 const STRUCTURES: &str = "linear,bsp,octree,quadtree,bvh,wide";
 
-/// Changes below this are not looked for: two builds of one source differ as much
-/// by where their code lies.
+/// Least change to look for.
+///
+/// Two builds of one source differ as much by where their code lies.
 const LEAST_THRESHOLD: f64 = 0.01;
 
 pub fn compare_against<'a>(
@@ -65,7 +67,7 @@ pub fn compare_against<'a>(
     interrupt::from_now_on_finish();
     let of_run = arguments(&plan.structures)?;
     let patience = Duration::from_secs(args.what.timeout);
-    // There are no pipes, and so no folder for them.
+    // Without pipes no folder is needed for them.
     let workers = || Workers::new(of_run.clone(), patience, Path::new(""));
     let mut duel = Duel {
         args,
@@ -73,7 +75,7 @@ pub fn compare_against<'a>(
         sides: [workers()?.of(binary), workers()?.of(&own)],
         rng: Pcg64::seed_from_u64(plan.plan.seed),
     };
-    // Before it begins: afterwards the load is its own.
+    // Before the start: afterwards the load is our own.
     let busy = Machine::capture().busy().filter(|_| is_timed);
     let (changes, head) = duel.run()?;
     let note = |busy| format!("{busy}: both sides suffered alike, and it may take more pairs");
@@ -93,10 +95,10 @@ pub fn compare_against<'a>(
     })
 }
 
-/// Line on the default structures of a run that a comparison lacks.
+/// A line about the default structures of a run that a comparison omits.
 fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> Result<Option<String>> {
     let default = registry.structures(args.moves.list(DEFAULT))?.into_iter();
-    // As labels stand before a policy of updates.
+    // Labels without a policy of updates.
     let compared = of.plan.structures.iter();
     let compared: Vec<_> = compared.map(|s| s.label.split('@').next()).collect();
     let is_in = |name: &String| compared.contains(&Some(name));
@@ -106,7 +108,7 @@ fn left_out(registry: &Registry, args: &WhatArgs, of: &RunPlan) -> Result<Option
     Ok(is_default.then(|| format!("{note}: {names} {more}")))
 }
 
-/// The program of a name, as in a shell: one without a folder is looked up in PATH.
+/// The program of a name, as in a shell: looked up in PATH if it has no folder.
 fn program(name: &Path) -> Result<PathBuf> {
     let found = match name.parent() {
         Some(folder) if folder.as_os_str().is_empty() => {
@@ -135,7 +137,7 @@ fn side(program: &Path) -> Result<Side> {
     })
 }
 
-/// Toolchain of a program, by its own words.
+/// Toolchain of a program, according to its own output.
 fn toolchain(program: &Path) -> Option<Toolchain> {
     let told = Command::new(program)
         .args(["env", "--format", "json"])
@@ -144,7 +146,7 @@ fn toolchain(program: &Path) -> Option<Toolchain> {
     Toolchain::deserialize(&told["toolchain"]).ok()
 }
 
-/// The options of `run` that were typed behind `compare`.
+/// The options of `run` that were typed after `compare`.
 fn typed() -> Result<Vec<String>> {
     Ok(TypedOptions::of("compare", "run", std::env::args_os())?.words(|_| true))
 }
@@ -161,7 +163,7 @@ fn arguments(structures: &str) -> Result<Vec<String>> {
     Ok(arguments)
 }
 
-/// Refuses options of a measurement where nothing is measured.
+/// Refuses options of a measurement if nothing is measured.
 pub fn expect_none_of_a_run() -> Result<()> {
     if let Some(option) = typed()?.first().and_then(|typed| typed.split('=').next()) {
         bail!(
@@ -172,19 +174,22 @@ pub fn expect_none_of_a_run() -> Result<()> {
     Ok(())
 }
 
-/// How long one of a pair runs before the other takes its turn: well below the
-/// time in which a shared machine changes its speed.
+/// Time for which one process of a pair runs before the other takes over.
+///
+/// Well below the time in which a shared machine changes its speed.
 const TURN: Duration = Duration::from_millis(5);
 
 /// The sides of a comparison, as indices: the other program and this one.
 const OLD: usize = 0;
 const NEW: usize = 1;
 
-/// Pairs that are added until the answer is clear.
+/// Number of pairs added at a time until the answer is clear.
 const MORE: usize = 2;
 
-/// The first and the most pairs of a comparison: ten for a threshold of 5 %, more
-/// for less, as such a change needs on a shared machine. Work is counted without any.
+/// The initial and the largest number of pairs of a comparison.
+///
+/// Ten for a threshold of 5 %, more for a smaller one, as required on a shared machine; none to
+/// count work.
 fn pairs(args: &CompareArgs) -> (usize, usize) {
     match args.threshold {
         _ if args.gate == Gate::Work => (0, 0),
@@ -199,18 +204,18 @@ struct Duel<'a> {
     /// Gate and threshold.
     args: &'a CompareArgs,
     plan: &'a Plan,
-    /// Workers by the arguments of `run` that the plan follows from.
+    /// Workers with the arguments of `run` from which the plan follows.
     sides: [Workers; 2],
     rng: Pcg64,
 }
 
 impl Duel<'_> {
-    /// Runs pairs of processes until every change is known to within the threshold; the
-    /// changes, and what they are based on.
+    /// Runs pairs of processes until every change is known to within the threshold.
     ///
-    /// # Errors
-    /// A program that cannot be started or is of another version, a scene that
-    /// it cannot read.
+    /// Returns the changes, and their basis in words.
+    ///
+    /// # Errors A program that cannot be started or is of another version, a scene that it cannot
+    /// read.
     fn run(&mut self) -> Result<(Changes, String)> {
         let started = Instant::now();
         let (first, most) = pairs(self.args);
@@ -254,7 +259,7 @@ impl Duel<'_> {
         }
     }
 
-    /// The changes of all cells by the parts of both sides.
+    /// The changes of all cells, from the parts of both sides.
     fn changes(&self, seen: &[Vec<Part>; 2]) -> Changes {
         let cells = seen.each_ref().map(|parts| -> Vec<ReportCell> {
             let groups = grouped(parts.iter().map(|part| (&part.key, part.clone())));
@@ -270,11 +275,11 @@ impl Duel<'_> {
         changes(Basis::Pairs, [old, new], self.args.threshold, metrics)
     }
 
-    /// Has both sides count and check their answers.
+    /// Lets both sides count and check their answers.
     fn count(&self) -> Result<[Vec<Part>; 2]> {
         let mut seen = [Vec::new(), Vec::new()];
         for scene in 0..self.plan.scenes.len() {
-            // The plan is the new side's; the old one keeps to it.
+            // The new side makes the plan; the old one follows it.
             for side in [NEW, OLD] {
                 let mut share = self.share(scene, 0, [&seen[NEW], &[]]);
                 share.plan_only = true;
@@ -287,8 +292,9 @@ impl Duel<'_> {
         Ok(seen)
     }
 
-    /// One process's share of a scene: the plan of the new side, and the answers of its
-    /// own side to be counted.
+    /// One process's share of a scene.
+    ///
+    /// The plan is the new side's; the answers to count are those of its own side.
     fn share(&self, scene: usize, process: u32, [new, own]: [&[Part]; 2]) -> Share {
         let keys = self.plan.keys_of(&self.plan.scenes[scene]);
         let known = keys.iter().map(|key| {
@@ -304,11 +310,11 @@ impl Duel<'_> {
         }
     }
 
-    /// One pair of processes on one scene, in turns; old and new.
+    /// One pair of alternating processes on one scene; old and new.
     fn pair(&mut self, scene: usize, pair: u32, seen: &[Vec<Part>; 2]) -> Result<[Vec<Part>; 2]> {
         let mut parts = [Vec::new(), Vec::new()];
-        // Which side is started first, and gets the first memory, is drawn for every pair,
-        // and apart from it whose turn is first: old, new, new, old, ...
+        // The side that is started first, and gets the first memory, is drawn for every pair;
+        // independently, so is the side whose turn is first: old, new, new, old, ...
         let first: usize = self.rng.random_range(0..2);
         let begins: usize = self.rng.random_range(0..2);
         let mut workers = [None, None];
@@ -316,7 +322,7 @@ impl Duel<'_> {
             let share = self.share(scene, pair, [&seen[NEW], &seen[side]]);
             let job = Job::scene(scene, share, false);
             let mut worker = self.sides[side].start(0, self.rng.random(), job)?;
-            // A side is held for half of the time.
+            // A side is suspended for half of the time.
             worker.patience = worker.patience.saturating_mul(2);
             workers[side] = Some(worker);
         }

@@ -1,6 +1,7 @@
-//! `cullbench compare`: one run compared with an older one. Reads two
-//! report.json and measures nothing; the verdicts come from `report`, the table
-//! from `compare_table`.
+//! `cullbench compare`: one run compared with an older one.
+//!
+//! Reads two report.json and measures nothing; the verdicts come from `report`, the table from
+//! `compare_table`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -49,7 +50,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     };
     each_once("metric", &metrics)?;
     let files = match (&args.baseline, &args.old, &args.new) {
-        // The only run that is named is NEW.
+        // A single named run is NEW.
         (Some(name), new, _) => baseline_and(name, new.clone())?,
         (None, Some(old), Some(new)) => [old.clone(), new.clone()],
         _ => bail!("two reports, or --against BINARY: expected one of them"),
@@ -108,7 +109,7 @@ fn notes(old: &Report, new: &Report, settings: &[Setting], gate: Gate) -> Vec<St
     notes
 }
 
-/// "10 processes", or the fewest and the most where cells differ.
+/// "10 processes", or the fewest and the most if cells differ.
 fn processes(report: &Report) -> String {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let counts = cells.map(|cell| cell.times.processes);
@@ -135,7 +136,7 @@ fn side(report: &Report) -> Side {
     }
 }
 
-/// Rows in the figure.
+/// Most rows of the figure.
 const DRAWN: usize = 40;
 
 /// Refuses a comparison that judges nothing.
@@ -230,7 +231,7 @@ pub fn baseline_file(name: &str) -> PathBuf {
     Path::new(BASELINES).join(format!("{name}.json"))
 }
 
-/// Keeps a report under a name, in the place of an older one.
+/// Saves a report under a name, replacing an older one.
 pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
     fs::create_dir_all(BASELINES).context(BASELINES)?;
     let write = |out: &mut dyn Write| Ok(serde_json::to_writer_pretty(out, report)?);
@@ -239,10 +240,10 @@ pub fn save_baseline(name: &str, report: &Report) -> anyhow::Result<()> {
 
 /// Files of a baseline and of the run to compare with it.
 ///
-/// The run is the newest of the others under results/ if none is named.
+/// If none is named, the run is the newest of the others under results/.
 fn baseline_and(name: &str, new: Option<PathBuf>) -> anyhow::Result<[PathBuf; 2]> {
     let file = baseline_file(name);
-    // There may be no such folder.
+    // The folder may be missing.
     let listing = fs::read_dir(BASELINES).into_iter().flatten().flatten();
     let known = listing.filter_map(|entry| entry.file_name().into_string().ok());
     let known = known.filter_map(|name| Some(name.strip_suffix(".json")?.to_owned()));

@@ -1,5 +1,6 @@
-//! The table of verdicts of a comparison, of two reports or of two programs, for a
-//! terminal, as Markdown or as JSON. The verdicts come from `report` and `statistics`.
+//! The table of verdicts of a comparison, of two reports or of two programs.
+//!
+//! For a terminal, as Markdown or as JSON; the verdicts come from `report` and `statistics`.
 
 use std::io::{self, Write};
 
@@ -17,10 +18,10 @@ use crate::report::{
 };
 use crate::statistics::{Change, Judgement, median};
 
-/// Counters in the list; `--all` shows every one.
+/// Most counters that are listed without `--all`.
 const LISTED: usize = 20;
 
-/// Further processes of a run that are worth a try.
+/// Most further processes of a run that are worth suggesting.
 const MOST_MORE: usize = 100;
 
 /// OLD or NEW.
@@ -44,7 +45,7 @@ pub struct CompareTable<'a> {
 }
 
 impl CompareTable<'_> {
-    /// 1 for a wrong answer, otherwise 3 for a regression; and its name in JSON.
+    /// 1 for a wrong answer, else 3 for a regression; and its name in JSON.
     pub fn verdict(&self) -> (Ending, &'static str) {
         let open = [Outcome::Inconclusive, Outcome::Different];
         let is_undecided = open.iter().any(|open| self.changes.count(*open) > 0)
@@ -73,7 +74,7 @@ impl CompareTable<'_> {
         };
         let shifts = self.changes.proven_shifts();
         let shift = text::some(shifts.first(), |_| {
-            // The shift alone may leave it open.
+            // Only the shift may be undecided.
             let is_open = verdict == "inconclusive";
             let among = match is_open && self.changes.count(Outcome::Inconclusive) == 0 {
                 true => ";",
@@ -155,7 +156,7 @@ impl CompareTable<'_> {
         }
     }
 
-    /// The document for Markdown, or with a table for a terminal of some `room`.
+    /// The document for Markdown, or for a terminal with `room` for a table.
     pub fn blocks(&self, all: bool, room: Option<usize>) -> Vec<Block> {
         let changes = &self.changes;
         let (head, threshold) = (self.head(), text::significant(changes.threshold * 100.0));
@@ -207,7 +208,7 @@ impl CompareTable<'_> {
         }
         let summary = self.summary();
         lines.push(match room {
-            // It stands above the fold.
+            // The summary is above the fold.
             None => self.counts_line(),
             Some(_) => summary[..1].to_uppercase() + &summary[1..],
         });
@@ -215,7 +216,7 @@ impl CompareTable<'_> {
         blocks
     }
 
-    /// The change that is judged, as a caption has it.
+    /// The judged change, in the words of a caption.
     pub fn measure(&self) -> &'static str {
         match (self.args.gate, self.basis) {
             (Gate::Time, Basis::Reports) => {
@@ -225,7 +226,7 @@ impl CompareTable<'_> {
         }
     }
 
-    /// One row per figure; for a terminal the columns that `room` holds.
+    /// One row per figure; for a terminal, the columns that fit into `room`.
     fn table(&self, rows: &[&JudgedRow], room: Option<usize>) -> Table {
         let (change, processes) = match (self.args.gate, self.basis) {
             (Gate::Work, _) => ("change", "processes"),
@@ -242,7 +243,7 @@ impl CompareTable<'_> {
         let mut table = Table::of(&format!(
             "{places} | metric | >old | >new | >{change} | >resolves | >{processes} | verdict | why"
         ));
-        // Beside the widest other column, "vs the others [95 %]", and three gaps.
+        // Next to the widest other column, "vs the others [95 %]", and three gaps.
         let widest = |of: &dyn Fn(&JudgedRow) -> usize| rows.iter().map(|row| of(row)).max();
         let structure = widest(&|row| short_structure(&row.cell.structure).chars().count());
         let metric = widest(&|row| row.metric.map_or(0, str::len));
@@ -255,7 +256,7 @@ impl CompareTable<'_> {
         let short = |group: &&GroupKey| place(group, left, short);
         let full = |group: &&GroupKey| place(group, usize::MAX, text::plain);
         let places = distinct(&groups, short, full);
-        // Beside a common shift a verdict is no more than a place among the others.
+        // With a common shift a verdict is only relative to the others.
         let shifts = changes.proven_shifts();
         for row in rows {
             let at = groups.iter().position(|group| **group == row.cell.group);
@@ -305,7 +306,7 @@ impl CompareTable<'_> {
         let is_of_metric = |row: &&JudgedRow| row.metric.is_none() || row.metric == metric;
         first_to_go.retain(|name| *name != "metric" || rows.iter().all(is_of_metric));
         let table = table.within(room, &first_to_go);
-        // One value alone says nothing.
+        // One value alone is not informative.
         match table.header.iter().any(|name| name == "old") {
             true => table,
             false => table.within(0, &["new"]),
@@ -315,7 +316,7 @@ impl CompareTable<'_> {
     /// "2 slower, 3 inconclusive, 1 faster, 92 same of 98 cells".
     fn counts_line(&self) -> String {
         let changes = &self.changes;
-        // The verdicts of the gate are shown in any case.
+        // The verdicts of the gate are always shown.
         let of_work = [Outcome::MoreWork, Outcome::LessWork, Outcome::Same];
         let is_of_gate = |outcome: Outcome| match self.args.gate {
             Gate::Time => outcome.is_judged(),
@@ -387,7 +388,7 @@ impl CompareTable<'_> {
                 )
             }
         };
-        // Of many cells some are beyond it by chance.
+        // Of many cells some exceed it by chance.
         let most = Some(1.0 + self.changes.threshold);
         let why = match undecided.iter().any(|found| found.lower > most) {
             true => " (an interval is of one cell, a verdict allows for all of them)",
@@ -408,7 +409,7 @@ pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
     format!("{} %{interval}", change(ratio))
 }
 
-/// Line on the change that all cells share.
+/// A line about the change that all cells share.
 fn shift_line(shift: &CommonShift) -> String {
     let percent = |ratio: f64| format!("{:.1}", ratio * 100.0);
     let interval = text::some(shift.lower.zip(shift.upper), |(lower, upper)| {
@@ -442,7 +443,7 @@ fn work_line(work: &WorkChange) -> String {
     format!("work changed: {name}: {counter} {old} to {new}{much}")
 }
 
-/// Why a row is what it is, where the figures do not say it.
+/// The reason for a row's outcome, unless the figures show it.
 pub fn reason(row: &JudgedRow) -> String {
     let (old, new) = (row.old_status, row.new_status);
     let became = match row.outcome == Outcome::FailedInBoth {
@@ -452,7 +453,7 @@ pub fn reason(row: &JudgedRow) -> String {
     text::joined(became.into_iter().chain(row.reason.clone()))
 }
 
-/// Every reason once, with the only cell of it or their number.
+/// Every reason once, with its only cell or the number of its cells.
 fn reasons(rows: &[&JudgedRow]) -> Vec<String> {
     let told = rows.iter().filter(|row| !reason(row).is_empty());
     let told = told.map(|row| {
@@ -487,7 +488,7 @@ pub fn counted(cells: &[Lone]) -> String {
     format!("{} ({name}{more})", text::counted(cells.len(), "cell"))
 }
 
-/// How many cells only one side has; each that is wrong by its name.
+/// Number of cells of only one side; wrong ones each by name.
 fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
     let all = (!cells.is_empty()).then(|| format!("only in {side}: {}", counted(cells)));
     let wrong = cells.iter().filter(|cell| cell.status.is_failure());

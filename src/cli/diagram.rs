@@ -1,4 +1,4 @@
-//! Diagrams: series of places over two axes, with their names beside the plot.
+//! Diagrams: series of points over two axes, with their names beside the plot.
 
 use super::figure::{Axis, CHARACTER, Figure, LINE, Look, class, line, mark};
 use super::text::{self, html, shortened};
@@ -9,22 +9,22 @@ const NAME: usize = 20;
 /// Usual height of the plot.
 const HEIGHT: f64 = 280.0;
 
-/// A place of a diagram.
+/// A point of a diagram.
 #[derive(Default)]
 pub struct Point {
     pub at: [f64; 2],
     /// Intervals of the vertical and of the horizontal value.
     pub ends: Option<[f64; 2]>,
     pub wide: Option<[f64; 2]>,
-    /// Text on pointing at it; empty for none.
+    /// Tooltip; empty for none.
     pub note: String,
-    /// Name of its height, if that has one.
+    /// Name of its height, if it has one.
     pub level: String,
     pub is_cross: bool,
     pub is_large: bool,
 }
 
-/// Places with the look of a structure.
+/// Points with the look of a structure.
 pub struct Series {
     pub name: String,
     pub look: Look,
@@ -33,7 +33,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Places of a structure.
+    /// Points of a structure.
     pub fn of(structure: &str, is_scan: bool, points: Vec<Point>) -> Series {
         Series {
             name: structure.to_owned(),
@@ -44,14 +44,14 @@ impl Series {
     }
 }
 
-/// Joining of the places of a series.
+/// Rendering of the points of a series.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Joined {
     /// Lines, named at their right ends, with marks.
     Marked,
-    /// The same without marks.
+    /// Lines as in `Marked`, without marks.
     Bare,
-    /// Marks alone, named in a legend.
+    /// Marks alone, with names in a legend.
     Apart,
 }
 
@@ -64,12 +64,12 @@ pub struct Diagram<'d> {
     pub series: Vec<Series>,
     /// Corners of a line in front of all series.
     pub front: Vec<[f64; 2]>,
-    /// Names of heights, beside the plot.
+    /// Named heights, beside the plot.
     pub levels: Vec<(f64, String)>,
 }
 
 impl<'d> Diagram<'d> {
-    /// A diagram of the usual height with neither front nor levels.
+    /// A diagram of the usual height without front and levels.
     pub fn of(caption: String, axes: [Axis<'d>; 2], joined: Joined, series: Vec<Series>) -> Self {
         Diagram {
             caption,
@@ -111,14 +111,14 @@ impl<'d> Diagram<'d> {
             own
         });
         let classes: Vec<String> = classes.collect();
-        // A name beside the plot, with a line that leads to it.
+        // A name beside the plot, with a line to its curve.
         let named = names.iter().map(|(name, [x, y], at)| {
             let (lead, name) = (line("lead", [*x, 100.0], [*y, at - 4.0]), html(name));
             format!("{lead}<text x=\"100%\" dx=\"8\" y=\"{at:.1}\">{name}</text>")
         });
         let named: Vec<String> = named.collect();
         let is_apart = self.joined == Joined::Apart;
-        // The strongest are drawn last, in front of the others.
+        // The most important are drawn last, in front of the others.
         for (n, series) in self.series.iter().enumerate().rev() {
             let name = if is_apart { "" } else { &named[n] };
             parts += &self.group(series, &classes[n], name);
@@ -152,7 +152,7 @@ impl<'d> Diagram<'d> {
         }
     }
 
-    /// Lines through places, as one shape that is stretched to the width.
+    /// A polyline through points, as one shape that is stretched to the width.
     fn curve(&self, class: &str, places: &[[f64; 2]]) -> String {
         let point = |[x, y]: &[f64; 2]| format!("{:.0},{y:.0} ", 10.0 * x);
         let (points, height) = (places.iter().map(point), self.height);
@@ -167,7 +167,7 @@ impl<'d> Diagram<'d> {
         let places: Vec<[f64; 2]> = series.points.iter().map(|p| self.place(p.at)).collect();
         let mut shapes = match self.joined {
             Joined::Apart => String::new(),
-            // Without marks dashes tell two of one colour apart.
+            // Without marks, dashes distinguish two curves of one colour.
             Joined::Bare if series.look.hollow => {
                 self.curve(&format!("curve d{}", series.look.shape), &places)
             }
@@ -196,7 +196,7 @@ impl<'d> Diagram<'d> {
         format!("<g class=\"s {class}\" data-s=\"{of}\"><title>{of}</title>{shapes}{name}</g>\n")
     }
 
-    /// Names beside the plot with the ends of their lines, and heights a line apart.
+    /// Names beside the plot, the ends of their lines, and heights one line apart.
     fn names(&self) -> Vec<(String, [f64; 2], f64)> {
         let named = |name: &str, end| (shortened(name, NAME), end, 0.0);
         let end = |series: &Series| {
@@ -219,7 +219,7 @@ impl<'d> Diagram<'d> {
         ends
     }
 
-    /// Marks with names below the plot, for pictures; a page has its filter.
+    /// Marks with names below the plot, for pictures; a page has a filter instead.
     fn legend(&self, classes: &[String], below: f64) -> (String, f64) {
         let mut parts = String::new();
         for (n, (series, class)) in self.series.iter().zip(classes).enumerate() {
@@ -239,20 +239,20 @@ const NARROWEST: f64 = 330.0;
 /// A row of a figure: a value with up to two ranges around it.
 #[derive(Default)]
 pub struct Row {
-    /// A structure's name, or what else the value belongs to.
+    /// Name of the structure, or of the value's owner.
     pub name: String,
     pub is_scan: bool,
     pub value: f64,
-    /// Its interval, and a range within.
+    /// Its interval, and a narrower range.
     pub ends: Option<[f64; 2]>,
     pub inner: Option<[f64; 2]>,
     /// Text beside the mark.
     pub label: String,
-    /// Text on pointing at it.
+    /// Tooltip.
     pub note: String,
     /// Further attributes of the group.
     pub data: String,
-    /// True if a line joins it with the next row.
+    /// True if a line connects it with the next row.
     pub is_tied: bool,
 }
 
@@ -263,7 +263,7 @@ impl Row {
     }
 }
 
-/// Rows from above to below over one axis with the line at `one`.
+/// Rows from top to bottom over one axis, with a line at `one`.
 pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Figure {
     let bottom = LINE * 1.5 * rows.len() as f64 + 8.0;
     let y = |row: usize| LINE * (1.5 * row as f64 + 1.0);
@@ -281,7 +281,7 @@ pub fn rows(caption: String, axis: &Axis, one: Option<f64>, rows: &[Row]) -> Fig
         let mut shape = text::some(ends, |ends| line("interval", ends, [y0, y0]));
         shape += &text::some(range(row.inner), |ends| line("inner", ends, [y0, y0]));
         shape += &mark(look, "", [x, y0], "");
-        // A label stands where there is room on the narrowest page, or below.
+        // A label is placed where there is room on the narrowest page, or below.
         let [low, high] = ends.unwrap_or([x, x]);
         let length = CHARACTER * row.label.chars().count() as f64 / NARROWEST * 100.0;
         let is_beyond = high + length > 100.0;

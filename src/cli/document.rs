@@ -1,5 +1,6 @@
-//! A document of headings, lines and tables, written as Markdown, as one HTML page
-//! or for a terminal, and the escaping of each; tables as rows and columns.
+//! A document of headings, lines and tables, as Markdown, HTML or terminal text.
+//!
+//! With the escaping of each format; tables as rows and columns.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -17,7 +18,7 @@ pub enum Block {
     Table(Table),
     /// A table of numbers that HTML shades row by row.
     Heat(Table),
-    /// A picture as SVG, which only HTML can hold, as can a figure.
+    /// A picture as SVG; like a figure, only HTML can contain it.
     Picture(String),
     Figure(Figure),
 }
@@ -43,7 +44,7 @@ impl Block {
         [Block::heading(heading), Block::Table(table)]
     }
 
-    /// Sentence below a gap, as on what another option shows; nothing if `all`.
+    /// A sentence below a gap, such as about another option; empty if `all`.
     pub fn more(all: bool, sentence: &str) -> impl Iterator<Item = Block> {
         let lines = ["", sentence].map(Block::line).into_iter();
         lines.filter(move |_| !all)
@@ -61,7 +62,7 @@ fn markdown_table(table: &Table) -> String {
     line(&table.header) + &rule + &table.rows.iter().map(line).collect::<String>()
 }
 
-/// A table that scrolls inside itself.
+/// A table with its own scroll bar.
 ///
 /// A row of a structure has its name as `data-s`; the page shades numbers if `is_heat`.
 fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
@@ -93,8 +94,9 @@ fn html_table(table: &Table, heading: &str, is_heat: bool) -> String {
     )
 }
 
-/// Text of a line, with an escape before every mark of Markdown. A line break would
-/// end a table row.
+/// Text of a line, with every Markdown character escaped.
+///
+/// A line break would end a table row.
 fn markdown(text: &str) -> String {
     let marks = ['\\', '|', '`', '*', '_', '<', '[', '&', '~'];
     let text = text::plain(text);
@@ -116,7 +118,7 @@ pub fn to_markdown(blocks: &[Block]) -> String {
     parts.collect::<Vec<_>>().join("\n")
 }
 
-/// A text of Markdown folded behind a line, as GitHub and GitLab show it.
+/// Markdown text collapsed under a line, as on GitHub and GitLab.
 pub fn folded(line: &str, text: &str) -> String {
     let line = html(line);
     format!("<details>\n<summary>{line}</summary>\n\n{text}\n</details>\n")
@@ -142,13 +144,13 @@ pub fn show(blocks: &[Block]) -> io::Result<()> {
     io::stdout().lock().write_all(text.as_bytes())
 }
 
-/// The document as one page that needs no other file.
+/// The document as one self-contained page.
 pub fn to_html(title: &str, blocks: &[Block]) -> String {
     let body = format!("<main>\n{}</main>\n", elements(title, blocks));
     page(title, "", &body, include_str!("assets/page.js"))
 }
 
-/// The blocks as HTML; `caption` is of tables above all headings.
+/// The blocks as HTML; `caption` is for tables above all headings.
 pub fn elements<'t>(mut caption: &'t str, blocks: &'t [Block]) -> String {
     let parts = blocks.iter().map(|block| match block {
         Block::Heading(level, text) => {
@@ -164,7 +166,7 @@ pub fn elements<'t>(mut caption: &'t str, blocks: &'t [Block]) -> String {
     parts.collect()
 }
 
-/// A page that needs no other file, in the style of all pages.
+/// A self-contained page in the common style.
 pub fn page(title: &str, style: &str, body: &str, script: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"/><meta \
@@ -179,17 +181,16 @@ pub fn page(title: &str, style: &str, body: &str, script: &str) -> String {
 
 /// Blanks between columns.
 const GAP: usize = 2;
-/// Characters of a line of text in the last column, at least.
+/// Least characters of a line of text in the last column.
 const LEAST_TEXT: usize = 20;
 
-/// A column of rows `R`: its head, with `>` before that of numbers, and its cell of
-/// a row.
+/// A column of rows `R`: its header, with `>` before that of numbers, and its cell.
 pub type Column<R> = (&'static str, fn(&R) -> String);
 
-/// A table whose cells may hold any text.
+/// A table whose cells may contain any text.
 pub struct Table {
     pub header: Vec<String>,
-    /// True of columns of numbers, whose cells end at the right.
+    /// For each column, true if its cells are right-aligned numbers.
     pub right: Vec<bool>,
     pub rows: Vec<Vec<String>>,
 }
@@ -203,8 +204,9 @@ impl Table {
         }
     }
 
-    /// A table of heads with bars between them and `>` before those of numbers:
-    /// "structure | > query | > build | status".
+    /// An empty table from headers with bars between them.
+    ///
+    /// `>` precedes headers of numbers: "structure | > query | > build | status".
     pub fn of(columns: &str) -> Table {
         let heads: Vec<&str> = columns.split('|').map(str::trim).collect();
         let bare = |head: &&str| head.trim_start_matches('>').trim_start().to_owned();
@@ -224,7 +226,7 @@ impl Table {
 
     /// A table of cells with the names of their rows and columns, each pair once.
     ///
-    /// Names are in the order in which they first occur; cells are numbers.
+    /// Names are in the order of their first occurrence; cells are numbers.
     pub fn grid(title: &str, cells: impl IntoIterator<Item = [String; 3]>) -> Table {
         let cells: Vec<[String; 3]> = cells.into_iter().collect();
         let heads = unique(cells.iter().map(|[_, head, _]| head.as_str()));
@@ -240,7 +242,7 @@ impl Table {
         table
     }
 
-    /// The first column holds names, all others numbers.
+    /// The first column has names, all others numbers.
     pub fn of_numbers(header: impl IntoIterator<Item = impl Into<String>>) -> Table {
         let header: Vec<String> = header.into_iter().map(Into::into).collect();
         let right = (0..header.len()).map(|column| column > 0).collect();
@@ -255,7 +257,7 @@ impl Table {
 
     /// The table without columns that do not fit, for [`Table::bare`].
     ///
-    /// The named ones go, in this order, until `width` characters hold a row.
+    /// The named ones are dropped, in this order, until a row fits into `width` characters.
     pub fn within(&self, width: usize, first_to_go: &[&str]) -> Table {
         let (widths, mut gone) = (self.widths(), first_to_go.iter());
         let mut left: Vec<usize> = (0..widths.len()).collect();
@@ -266,8 +268,9 @@ impl Table {
         self.of_columns(&left)
     }
 
-    /// The table as tables of at most `width` characters, for [`Table::bare`]: each has
-    /// the names, which stand before the first numbers, and as many further columns as
+    /// Splits a table into tables of at most `width` characters, for [`Table::bare`].
+    ///
+    /// Each has the name columns, which precede the first numbers, and as many further columns as
     /// fit, at least one.
     pub fn parts(&self, width: usize) -> Vec<Table> {
         let widths = self.widths();
@@ -324,9 +327,9 @@ impl Table {
         text
     }
 
-    /// The table for a terminal: [`Table::parts`] below each other.
+    /// The table for a terminal: [`Table::parts`] one below the other.
     ///
-    /// Text in the last column is wrapped, where that is enough instead.
+    /// If wrapping the last column's text suffices, that is done instead.
     pub fn fitted(&self, width: usize) -> String {
         if let Some(table) = self.wrapped_last(width) {
             return table.bare();
@@ -338,7 +341,7 @@ impl Table {
 
     /// The table with text in its last column wrapped.
     ///
-    /// `None` if that is not needed or does not help.
+    /// `None` if that is unnecessary or does not help.
     pub fn wrapped_last(&self, width: usize) -> Option<Table> {
         let widths = self.widths();
         let last = widths.len().checked_sub(1)?;
@@ -472,7 +475,7 @@ mod tests {
              9 us\nbsp   9 us  01234567890123456789\n            01\n"
         );
         assert_eq!(table.fitted(45), table.bare());
-        // Too narrow for text: a part of its own.
+        // Too narrow for text: a separate part.
         assert_eq!(table.fitted(31).matches("name").count(), 2);
     }
 }

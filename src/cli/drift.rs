@@ -1,5 +1,6 @@
-//! `cullbench drift`: tables of the errors of camera bases and spring arms, of the
-//! cost of a step of each, and recommendations.
+//! `cullbench drift`: errors and costs of camera bases and spring arms.
+//!
+//! Tables, and recommendations.
 
 use super::args::DriftArgs;
 use super::diagram::{Diagram, Joined, Point, Series};
@@ -54,7 +55,7 @@ fn blocks(report: &DriftReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// The tables; with `all` a line about each method and limits of stability too.
+/// The tables; with `all` also a line about each method and limits of stability.
 fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
     let [yaw, pitch, roll] = STEADY;
     let (steps, rounds) = (report.steps as f64, text::counted(report.rounds, "round"));
@@ -83,7 +84,7 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
     blocks
 }
 
-/// Ways to turn with errors and time; with `all` a line about each.
+/// Rotation methods with errors and time; with `all` a line about each.
 fn bases(report: &DriftReport, all: bool) -> Table {
     let columns: [Column<&Rotation>; 5] = [
         ("method", |r| r.method.name.to_owned()),
@@ -98,7 +99,7 @@ fn bases(report: &DriftReport, all: bool) -> Table {
     Table::with(&report.rotation, &columns[..shown])
 }
 
-/// The way to turn, and the method to take for each stiffness of each arm.
+/// The recommended rotation, and the method for each stiffness of each arm.
 fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
     let base = ("camera base".to_owned(), &report.recommended_rotation);
     let arms = report.arm_choices.iter().map(|choice| {
@@ -128,7 +129,7 @@ fn by_stiffness(report: &DriftReport) -> Table {
     Table::grid(&format!("within {ARM_TOLERANCE:e}"), cells)
 }
 
-/// The fewest steps that are precise enough, or the nearest: "x4: 1.2e-4, 3.21 us".
+/// The fewest precise steps, else the most precise: "x4: 1.2e-4, 3.21 us".
 fn within(points: &[ArmPoint]) -> String {
     let is_good = |p: &&ArmPoint| p.position_error <= ARM_TOLERANCE;
     let sound = points.iter().filter(|p| !p.position_error.is_nan());
@@ -141,7 +142,7 @@ fn within(points: &[ArmPoint]) -> String {
     format!("{no}x{}: {:.1e}, {time}", p.substeps, p.position_error)
 }
 
-/// The methods of arms: what they do, classical orders, limits of stability.
+/// Methods of arms: description, classical orders, limits of stability.
 fn methods(report: &DriftReport) -> Table {
     let columns: [Column<&Stability>; 4] = [
         ("method", |m| m.method.name.to_owned()),

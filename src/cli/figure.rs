@@ -1,8 +1,8 @@
-//! Parts of every figure as SVG: axes, marks, and its form on a page or in a file.
+//! Common parts of SVG figures: axes, marks, and the forms on pages and in files.
 //!
-//! Horizontal places are percentages of the plot, so that text keeps its size on every
-//! width; margins beside the plot are in pixels. Marks carry their figures as `data-`
-//! attributes. The same figure stands on a page or, with its style, in a file of its own.
+//! Horizontal positions are percentages of the plot, so that text keeps its size at every width;
+//! margins beside the plot are in pixels. Marks carry their figures as `data-` attributes. The same
+//! figure is part of a page or, with its style, a file.
 
 use std::iter::successors;
 use std::ops::Range;
@@ -10,29 +10,29 @@ use std::ops::Range;
 use super::text::{self, html, shortened};
 use crate::statistics::Estimate;
 
-/// Series of a figure in full colour; the others are weak.
+/// Number of series of a figure in full colour; the others are faint.
 pub const STRONG: usize = 8;
-/// Least distance of two lines of text.
+/// Least distance of two lines of text, px.
 pub const LINE: f64 = 16.0;
-/// Width of a character, px, as far as margins need it.
+/// Approximate width of a character for margins, px.
 pub const CHARACTER: f64 = 6.8;
-/// Widths of a picture with one figure in a row, and of each of several.
+/// Widths of a picture with one figure per row, and of each of several, px.
 const WIDTHS: [f64; 2] = [900.0, 460.0];
 
 /// Returns true for a value with a place on a logarithmic axis.
 ///
-/// These reach far beyond anything measured. Near the ends of floating point, steps along an
-/// axis would never come to its end.
+/// The limits are far beyond any measurement. Near the limits of floating point, steps along an
+/// axis would never reach its end.
 pub fn is_drawn(value: f64) -> bool {
     (1e-30..1e30).contains(&value)
 }
 
-/// Ends of an interval that have a place on a logarithmic axis.
+/// Ends of an interval, if both have a place on a logarithmic axis.
 pub fn ends(value: Estimate) -> Option<[f64; 2]> {
     (value.ends()).filter(|ends| ends.iter().all(|end| is_drawn(*end)))
 }
 
-/// Note in a caption on points that are not drawn.
+/// Note in a caption about points that are not drawn.
 pub fn left_out(count: usize) -> String {
     text::any(count, "point", |points| {
         format!(" ({points} beyond the axis left out)")
@@ -44,13 +44,13 @@ pub struct Axis<'t> {
     pub title: &'t str,
     values: Range<f64>,
     is_log: bool,
-    /// Ticks where they are not powers or round numbers.
+    /// Ticks that are not powers or round numbers.
     pub ticks: Vec<f64>,
     pub shown: &'t dyn Fn(f64) -> String,
 }
 
 impl<'t> Axis<'t> {
-    /// A logarithmic axis around all values that have a place on it, wider by `factor`.
+    /// A logarithmic axis around all values with a place on it, extended by `factor`.
     pub fn log(
         title: &'t str,
         values: impl Iterator<Item = f64>,
@@ -127,7 +127,7 @@ impl<'t> Axis<'t> {
         round_values([start, end], 5.0).1
     }
 
-    /// Lines across a plot down to `bottom`, and texts below that do not overlap.
+    /// Grid lines down to `bottom`, and labels below that do not overlap.
     pub fn across(&self, one: Option<f64>, bottom: f64) -> String {
         let (mut parts, mut free) = (String::new(), -LINE);
         for tick in self.all_ticks() {
@@ -166,7 +166,7 @@ pub struct Look {
     pub colour: usize,
     /// Index into [`SHAPES`].
     pub shape: usize,
-    /// Outlined; the structures with a place of their own are filled.
+    /// Outlined; structures with their own look are filled.
     pub hollow: bool,
 }
 
@@ -181,7 +181,7 @@ const SHAPES: [&str; 4] = [
 /// Colour of scans.
 const GREY: usize = 7;
 
-/// Structures with a look of their own: name, colour, shape.
+/// Structures with their own look: name, colour, shape.
 const OWN: [(&str, usize, usize); 9] = [
     ("wide", 0, 0),
     ("bvh", 1, 1),
@@ -195,7 +195,7 @@ const OWN: [(&str, usize, usize); 9] = [
 ];
 
 impl Look {
-    /// The look of series `n` that is no structure.
+    /// The look of series `n` that is not a structure.
     pub fn nth(n: usize) -> Look {
         Look {
             colour: n % GREY,
@@ -206,8 +206,8 @@ impl Look {
 
     /// The look of a structure by its label.
     ///
-    /// Names without a look of their own have a hollow mark that their text decides. With
-    /// parameters or a policy a structure keeps its colour and has another mark, hollow.
+    /// Names without their own look get a hollow mark derived from their text. With parameters or a
+    /// policy a structure keeps its colour and gets another mark, hollow.
     pub fn of(label: &str) -> Look {
         // FNV-1a.
         let hash = |text: &str| {
@@ -226,7 +226,7 @@ impl Look {
     }
 }
 
-/// The mark of a structure with its note, around `x` in percent and `y` in pixels.
+/// The mark of a structure with its tooltip, at `x` in percent and `y` in pixels.
 pub fn mark(look: Look, kind: &str, [x, y]: [f64; 2], note: &str) -> String {
     let class = if look.hollow { "mark hollow" } else { "mark" };
     let corners = SHAPES[look.shape];
@@ -244,7 +244,7 @@ pub fn line(class: &str, [x1, x2]: [f64; 2], [y1, y2]: [f64; 2]) -> String {
     )
 }
 
-/// Class of the series at a place in the order of importance; scans are grey.
+/// Class of a series by its index in the order of importance; scans are grey.
 pub fn class(look: Look, is_scan: bool, place: usize) -> String {
     match place < STRONG {
         _ if is_scan => "c7".to_owned(),
@@ -260,7 +260,7 @@ pub struct Figure {
     pub margins: [f64; 2],
     pub height: f64,
     pub parts: String,
-    /// Marks with names for pictures, and its height; a page has its filter.
+    /// Marks with names for pictures, and their height; a page has a filter instead.
     pub legend: (String, f64),
 }
 
@@ -306,7 +306,7 @@ pub fn picture(figures: &[Figure], columns: usize) -> String {
         y += height;
     }
     let width = width * columns.min(figures.len()).max(1) as f64;
-    // Programs that are no browsers do not resolve variables.
+    // Programs other than browsers do not resolve variables.
     let style = include_str!("assets/figure.css").replace("var(--bg)", "#fff");
     let style = style.replace("var(--fg)", "#1b1d21");
     let style = style.replace("var(--soft)", "#5c636e");
@@ -382,7 +382,7 @@ mod tests {
         for (n, look) in names.iter().enumerate() {
             assert!(!names[..n].contains(look), "{look:?}");
         }
-        // Parameters and policies keep the colour, and have marks of their own.
+        // Parameters and policies keep the colour, and have their own marks.
         for name in ["wide", "bvh", "peer-bvh"] {
             let looks =
                 ["", "@rebuild", "@every=10"].map(|rest| Look::of(&format!("{name}{rest}")));

@@ -1,6 +1,6 @@
-//! `cullbench funnel`: every stage from region to fragment with every back end on
-//! the views of a path, and what each is worth. How it is shown is in
-//! `funnel_table`.
+//! `cullbench funnel`: every stage from region to fragment, with its gain.
+//!
+//! All back ends of each stage on the views of a path. `funnel_table` displays the report.
 
 use std::cell::Cell;
 use std::fs;
@@ -81,9 +81,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> Result<Ending> {
     Ok(Ending::of(keep_their_word(&report.stages, &report.picks)))
 }
 
-/// Returns true if nothing visible is lost and nothing exact wrong.
+/// Returns true if no visible item is lost and no exact stage is wrong.
 ///
-/// Behind an unproven stage of the chain, items that the lost ones hid are seen.
+/// After an unproven stage of the chain, items become visible that lost ones hid.
 fn keep_their_word(stages: &[StageRow], picks: &[PickRow]) -> bool {
     use Guarantee::{Exact, SampleExact, Unproven};
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Unproven;
@@ -101,7 +101,7 @@ fn keep_their_word(stages: &[StageRow], picks: &[PickRow]) -> bool {
         && picks.all(|row| row.guarantee != Exact || row.wrong_count == 0)
 }
 
-/// The back ends that were named, and those that suit the scene.
+/// The named back ends, and the defaults that suit the scene.
 fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Result<Chain> {
     let typed = [
         (StageKind::Region, &args.region),
@@ -133,7 +133,7 @@ fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Resu
     Ok(chain)
 }
 
-/// Room for structures, one each and more, and bytes per triangle.
+/// Room for structures, one per named one and one more, and bytes per triangle.
 const HELD: [u64; 3] = [1, 2, funnel::BYTES_PER_TRIANGLE];
 
 fn input<'s>(args: &'s FunnelArgs, setting: &'s Setting) -> Result<FunnelInput<'s>> {
@@ -158,10 +158,10 @@ pub fn time(registry: &Registry, args: &FunnelArgs, timing: &Timing) -> Result<P
 
 /// Tables of the report, each a list of rows or a single row, with their fields.
 ///
-/// `/` stands before a field of a field. The columns are the same for every report.
+/// `/` separates a field from its subfield. The columns are the same for every report.
 const TABLES: &str = include_str!("assets/funnel_tables.txt");
 
-/// Writes all tables; numbers as they are.
+/// Writes all tables, with full precision.
 pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let tables = serde_json::to_value(report)?;
@@ -172,7 +172,7 @@ pub fn write(report: &FunnelReport, folder: &Path) -> Result<()> {
             row => std::slice::from_ref(row),
         };
         let mut out = csv::Writer::from_writer(Vec::new());
-        // `excess/lower` is `excess_lower`, a value needs no more.
+        // `excess/lower` becomes `excess_lower`; a value has no suffix.
         let column = |path: &str| path.trim_end_matches("/value").replace('/', "_");
         let columns = fields.split_whitespace().map(column);
         let about = ["scene", "path"].map(str::to_owned).into_iter();
@@ -196,12 +196,12 @@ fn table_file(folder: &Path, table: &str) -> PathBuf {
     folder.join(format!("{name}.csv"))
 }
 
-/// Bars of what each stage of the chain leaves, in the colours of the picture.
+/// Bars of what remains after each stage of the chain, in the picture's colours.
 fn passed(report: &FunnelReport) -> Figure {
     let chosen = report.stages.iter().filter(|row| row.is_chosen);
     let chosen = chosen.filter(|row| row.back_end.name != NONE);
     let given = chosen.clone().map(|row| row.errors.input_count);
-    // There is no zero.
+    // Zero has no place on the axis.
     let axis = Axis::log("", given.chain([0.1]), 1.0, &funnel_table::count);
     let bottom = 2.0 * LINE * chosen.clone().count() as f64;
     let mut parts = axis.across(None, bottom);
@@ -211,7 +211,7 @@ fn passed(report: &FunnelReport) -> Figure {
         let [all, left, _] = counts.map(funnel_table::count);
         let (name, unit, at) = (stage.name(), row.unit, y + 12.0);
         parts += &format!("<text y=\"{at}\">{name}: {left} of {all} {unit}</text>\n");
-        // The picture does not show triangles, and facing the eye is not being seen.
+        // The picture has no triangles, and facing the eye is not the same as being seen.
         let classes = [[0, 3, 4], [1, 3, 4], [2, 3, 4], [6, 7, 7], [3, 3, 4]][stage as usize];
         let colours = classes.map(|class| FATE_CLASSES[class].colour);
         for (count, colour) in counts.into_iter().zip(colours) {
@@ -234,7 +234,7 @@ fn passed(report: &FunnelReport) -> Figure {
 
 /// Tables, figures and the picture as one page.
 fn page(report: &FunnelReport, scene: &Scene) -> String {
-    // Beside the picture's own, which narrow pages make small.
+    // In addition to the picture's own, which narrow pages make small.
     let key = FATE_CLASSES.iter().map(|Class { colour, words, .. }| {
         format!("<span><i style=\"background:{colour}\"></i>{words}</span> ")
     });
@@ -334,7 +334,7 @@ mod tests {
             region(Unproven, 1.0),
             occlusion(Conservative, 1.0)
         ]));
-        // Items that the lost ones hid are seen.
+        // Items hidden by lost ones become visible.
         for (is_chosen, keeps_its_word) in [(true, true), (false, false)] {
             let other = StageRow {
                 is_chosen,

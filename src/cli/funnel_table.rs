@@ -1,5 +1,6 @@
-//! The tables of `cullbench funnel`: a row for each stage and back end, the gain of
-//! each stage of the chain, and conclusions.
+//! The tables of `cullbench funnel`.
+//!
+//! A row for each stage and back end, the gain of each stage of the chain, and conclusions.
 
 use super::document::{Block, Column, Table};
 use super::text::{self, shortened, some};
@@ -7,7 +8,7 @@ use crate::funnel::{FunnelReport, Gain, NONE, PickRow, StageKind, StageRow};
 use crate::visibility::Guarantee;
 use crate::visibility::fragment::Tally;
 
-/// The chain and what it is worth; with `all` every other back end too.
+/// The chain and its gain; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
     let all_views = text::counted(report.cameras, "view");
     let [views, more] = match report.views == report.cameras {
@@ -77,7 +78,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
         let (section, name, reason) = (row.section, &row.name, &row.reason);
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));
-    // Notes about other back ends are shown with them only.
+    // Notes about other back ends are shown together with them only.
     let is_shown = |told: &&String| {
         let mut others = report.stages.iter().filter(|row| !row.is_chosen);
         all || !others.any(|row| row.loss().as_ref() == Some(*told))
@@ -130,10 +131,9 @@ fn gain(report: &FunnelReport, stage: StageKind) -> Option<&Gain> {
     report.gains.iter().find(|gain| gain.stage == stage)
 }
 
-/// Cost of drawing from which a stage pays off: "2.03 us/item".
+/// Cost of drawing above which a stage pays off: "2.03 us/item".
 ///
-/// Its interval, in JSON, is without the speed of the machine, which the time of the
-/// stage has.
+/// Its interval, in JSON, excludes the machine's speed, which affects the stage's time.
 fn worth(gain: &Gain) -> String {
     let unit = gain.unit.trim_end_matches('s');
     let Some(ns) = gain.break_even else {
@@ -141,13 +141,13 @@ fn worth(gain: &Gain) -> String {
     };
     match (ns.value, ns.lower, ns.upper) {
         (0.0, _, None | Some(0.0)) => "always".to_owned(),
-        // Within noise of saving time as well.
+        // Within the noise of saving time as well.
         (_, Some(0.0), Some(most)) => format!("<{}/{unit}", text::time(most)),
         (ns, ..) => format!("{}/{unit}", text::time(ns)),
     }
 }
 
-/// Boxes that were found in the solid of a scene.
+/// Boxes found in the solid of a scene.
 fn occluders(report: &FunnelReport) -> Table {
     let mut table = Table::of("where | >boxes | >of the volume, % | >found in");
     let mut add = |place: String, boxes: usize, share: Option<f64>, ns: f64| {

@@ -1,6 +1,7 @@
-//! Ctrl-C, and the signals of `kill` and of a closed terminal. Until a command has
-//! something to keep, each ends the program at once. After `from_now_on_finish` the
-//! first one stops the work at the next safe place, and the second one ends the program.
+//! Ctrl-C, and the signals of `kill` and of a closed terminal.
+//!
+//! Until a command has results to keep, each ends the program at once. After `from_now_on_finish`
+//! the first one stops the work at the next safe point, and the second one ends the program.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,32 +9,33 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 static HEARD: AtomicBool = AtomicBool::new(false);
 static TO_FINISH: AtomicBool = AtomicBool::new(false);
 
-/// From now on the work looks at [`asked`] and leaves nothing half done.
+/// Makes the work check [`asked`] from now on, to leave nothing half done.
 pub fn from_now_on_finish() {
     TO_FINISH.store(true, Ordering::Relaxed);
 }
 
-/// Ends a command that has nothing to keep.
+/// Ends a command without results to keep.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted: nothing was saved; anything printed is incomplete")]
 pub struct Interrupted;
 
 /// Returns true after a request to stop.
 ///
-/// For places before work that is then left out, of which [`heard`] tells.
+/// For points before work that is then skipped, which [`heard`] reports.
 pub fn asked() -> bool {
     let is_asked = ASKED.load(Ordering::Relaxed);
     HEARD.fetch_or(is_asked, Ordering::Relaxed);
     is_asked
 }
 
-/// Returns true if work was left out.
+/// Returns true if work was skipped.
 pub fn heard() -> bool {
     HEARD.load(Ordering::Relaxed)
 }
 
-/// # Errors
-/// [`Interrupted`] after a request to stop.
+/// Fails after a request to stop.
+///
+/// # Errors [`Interrupted`].
 pub fn check() -> Result<(), Interrupted> {
     (!asked()).then_some(()).ok_or(Interrupted)
 }
@@ -52,8 +54,7 @@ pub fn install() {
     if ignores_hangup() {
         return;
     }
-    // Without a handler Ctrl-C simply ends the program: nothing is lost but
-    // the cell that was being measured.
+    // Without a handler Ctrl-C simply ends the program: only the cell being measured is lost.
     if let Err(error) = ctrlc::set_handler(handler) {
         tell!("warning: no clean stop on Ctrl-C: {error}");
     }
@@ -61,8 +62,7 @@ pub fn install() {
 
 /// Returns true if `nohup` started the program.
 ///
-/// The handler takes all three signals or none, and a run under `nohup` must outlive its
-/// terminal.
+/// The handler takes all three signals or none, and a run under `nohup` must outlive its terminal.
 fn ignores_hangup() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

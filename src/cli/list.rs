@@ -47,17 +47,17 @@ pub fn list(registry: &Registry, one: Option<ListTopic>, format: TableFormat) ->
         }
     }
     if format == TableFormat::Json {
-        // One topic is a plain array, all of them an object.
+        // One topic is a plain array; all of them are an object.
         let only = all.values().next().filter(|_| one.is_some());
         print_json(&only.cloned().unwrap_or(Value::Object(all)))?;
     }
     Ok(Ending::Ok)
 }
 
-/// Further columns of a row, for people.
+/// Further columns of a row, in readable form.
 fn told(row: &Value) -> Vec<String> {
     let told = COLUMNS.split(' ').filter_map(|column| {
-        // Parameters as they are typed behind the name.
+        // Parameters in the form in which they are typed after the name.
         let value = plain(row.get(column)?, ", ").replace("\":", "=");
         Some((column, value.replace(['{', '}', '"'], "")))
     });
@@ -66,7 +66,7 @@ fn told(row: &Value) -> Vec<String> {
         .collect()
 }
 
-/// A row of a name, one further column and a summary.
+/// A row with a name, one further column and a summary.
 fn row(name: &str, column: &str, value: &str, summary: &str) -> Value {
     json!({ "name": name, column: value, "summary": summary })
 }
@@ -77,7 +77,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> Result<(&'static str, String, 
         ListTopic::Structures => {
             let row = |info: &Info| {
                 let mut params = registry.structure(info.name)?.params;
-                // One thread, the default, is in no label.
+                // One thread, the default, is omitted from labels.
                 let threaded = format!("{}:threads=2", info.name);
                 if registry.structure(&threaded).is_ok() {
                     params["threads"] = 1.into();
@@ -186,7 +186,7 @@ pub fn env(format: TableFormat) -> Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// A value for people, with `between` the values of a list.
+/// A value in readable form, with `between` between the values of a list.
 fn plain(value: &Value, between: &str) -> String {
     match value {
         Value::Null => "unknown".to_owned(),

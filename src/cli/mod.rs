@@ -1,13 +1,14 @@
-//! The command line: from what was typed to a validated plan to one file per
-//! command. It defines exit codes, progress and tables, and no arithmetic.
+//! The command line: from arguments to a validated plan to one file per command.
 //!
-//! It is a function of a [`Registry`]: [`main_with`] is the whole of the
-//! `cullbench` program, and of any program that adds a structure.
+//! Defines exit codes, progress and tables, and no arithmetic.
+//!
+//! A function of a [`Registry`]: [`main_with`] is the whole of the `cullbench` program, and of any
+//! program that adds a structure.
 //!
 //! Exit codes: 0 ok; 1 a wrong answer, none at all or a failed verification; 2 usage
 //! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
-/// Prints a line on stderr that `format!` makes.
+/// Prints a line made by `format!` on stderr.
 macro_rules! tell {
     ($($line:tt)*) => { $crate::cli::tell(&format!($($line)*)) };
 }
@@ -75,23 +76,23 @@ use args::{Cli, Command};
 use command_args::SceneCommand;
 use shared_args::TableFormat;
 
-/// How a command ended that did not fail, and its exit code.
+/// Ending of a command that did not fail, with its exit code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
-    /// Nothing to complain of.
+    /// No findings.
     Ok = 0,
     /// A structure answered wrongly.
     WrongAnswer = 1,
-    /// Slower than before, or no answer any more.
+    /// Slower than before, or an answer is missing.
     Regression = 3,
     /// Stopped by Ctrl-C.
     Interrupted = 130,
 }
 
 impl Ending {
-    /// Ending of a command that came to its end, told if it left out checks.
+    /// Ending of a completed command; reports it if checks were skipped.
     ///
-    /// A wrong answer counts before that.
+    /// A wrong answer takes precedence.
     fn of(is_right: bool) -> Ending {
         if interrupt::heard() {
             tell!("interrupted: only the cases shown were checked");
@@ -104,9 +105,9 @@ impl Ending {
     }
 }
 
-/// A program that does what its arguments say with the structures of a
-/// registry; its exit code. To be called once, from `main`: it reads the
-/// process's arguments and takes over Ctrl-C.
+/// Runs the program with the structures of a registry; returns its exit code.
+///
+/// Call it once, from `main`: it reads the process's arguments and handles Ctrl-C.
 ///
 /// ```no_run
 /// use cullbench::index::Registry;
@@ -120,8 +121,9 @@ pub fn main_with(registry: Registry) -> ExitCode {
     start(None, registry)
 }
 
-/// [`main_with`] under the name and the version of another crate, which help texts,
-/// reports and the commands in messages then have.
+/// [`main_with`] under the name and the version of another crate.
+///
+/// Help texts, reports and the commands in messages use these.
 ///
 /// ```no_run
 /// use cullbench::{cli, index::Registry};
@@ -138,14 +140,14 @@ pub fn main_as(program: (&'static str, &'static str), registry: Registry) -> Exi
 /// The only argument of a process that measures a share of a run.
 const WORKER: &str = "worker";
 
-/// Place of an error that no file has.
+/// Place of an error without a file.
 const OUTPUT: &str = "standard output: ";
 
 fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
     program::set(program);
     let ended = if std::env::args_os().skip(1).eq([WORKER]) {
-        // A terminal sends Ctrl-C to the whole group, and it is the parent that decides what
-        // becomes of its workers. Without this one ends early: its parent is about to end it.
+        // A terminal sends Ctrl-C to the whole group, and the parent decides about its workers.
+        // Without this one ends early: its parent is about to end it.
         drop(ctrlc::set_handler(|| ()));
         worker::worker(&registry)
     } else {
@@ -168,7 +170,7 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
             tell!("{Interrupted}");
             ExitCode::from(Ending::Interrupted as u8)
         }
-        // A reader who left is no failure.
+        // A reader that has closed the pipe is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
             tell!("error: {}", told_once(&error));
@@ -177,7 +179,7 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
     }
 }
 
-/// Shows what the argument parser has to say: an error on one line, or the help.
+/// Displays the argument parser's error on one line, or the help.
 fn refused(error: &clap::Error) -> ExitCode {
     let line = match program::one_line(error) {
         Some(line) => line,
@@ -251,7 +253,7 @@ fn manual(command: &clap::Command, pages: &mut Vec<u8>) -> io::Result<()> {
     below.try_for_each(|below| manual(below, pages))
 }
 
-/// Prints a text as one line on stderr, which a terminal gets wrapped.
+/// Prints a text as one line on stderr, wrapped for a terminal.
 ///
 /// Unlike `eprintln!`, does not panic if standard error is closed.
 fn tell(line: &str) {
@@ -271,15 +273,16 @@ fn load_scene(source: &str, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Checks before the work that outputs can be written, and that none is an input or
-/// another output. Inputs may be specs and names, or parts of files.
+/// Checks that outputs can be written, and that none is an input or another output.
+///
+/// Called before the work. Inputs may be specs and names, or parts of files.
 fn expect_places(outputs: &[(&str, &Option<PathBuf>)], inputs: &[impl AsRef<Path>]) -> Result<()> {
-    // The file system's own name, also of a file that does not exist yet.
+    // The canonical name in the file system, also for a file that does not exist yet.
     let known = |file: &Path| -> Option<PathBuf> {
         let place = folder_of(file).canonicalize().ok()?.join(file.file_name()?);
         Some(place.canonicalize().unwrap_or(place))
     };
-    // A run is all that was measured, and what was made of it but for its page.
+    // A run is its measurements and everything made from them except its page.
     let names = ["report.json", "summary.csv", "samples.csv", "stream.jsonl"];
     let files = inputs.iter().flat_map(|input| {
         let input = input.as_ref();
@@ -325,7 +328,7 @@ fn expect_named(option: &str, place: &Path, what: &str) -> Result<()> {
     Ok(())
 }
 
-/// Checks that a folder is writable, or that one of this name can be made.
+/// Checks that a folder is writable, or that one of this name can be created.
 fn expect_folder(option: &str, folder: Option<&Path>) -> Result<()> {
     let Some(folder) = folder else { return Ok(()) };
     expect_named(option, folder, "folder")?;
@@ -361,13 +364,14 @@ fn write_text(file: &Path, text: &str) -> Result<(), InputError> {
     write_atomically(file, |out| out.write_all(text.as_bytes()))
 }
 
-/// Writes a text as a file, if one is named for it.
+/// Writes a text as a file, if a file is named for it.
 fn write_if(file: &Option<PathBuf>, text: impl FnOnce() -> String) -> Result<(), InputError> {
     (file.as_ref()).map_or(Ok(()), |file| write_text(file, &text()))
 }
 
-/// For output that comes after the work: a reader who leaves early changes
-/// neither what was done nor the exit code.
+/// Ignores a closed pipe when writing output after the work.
+///
+/// A reader that stops early changes neither the work done nor the exit code.
 fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {
     match written {
         Err(error) if is_broken_pipe(&error) => Ok(()),
@@ -375,8 +379,7 @@ fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// The context first, then its causes, but for those that the text before
-/// them has told already.
+/// The context first, then its causes, except those that the text already contains.
 fn told_once(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().map(ToString::to_string) {
@@ -387,7 +390,7 @@ fn told_once(error: &anyhow::Error) -> String {
     let mut causes = error.chain();
     match causes.find_map(|cause| cause.downcast_ref::<io::Error>()) {
         Some(error) if !text.contains("expected") => {
-            // Files are named in the context.
+            // The context names files.
             let place = ["", OUTPUT][usize::from(text == error.to_string())];
             format!("{place}{text}{}", expected_by(error, "file or folder"))
         }

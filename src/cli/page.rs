@@ -1,4 +1,4 @@
-//! Pages of what commands show, with origin and the meaning of their columns.
+//! Pages of a command's output, with origin and the meaning of their columns.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use super::{program, run_table, text};
 use crate::input::warnings;
 use crate::measure::{BOUNDS, METRICS, Machine, Source, Toolchain};
 
-/// A page of what a terminal shows: conclusions, figures, and the other blocks.
+/// A page of a terminal's output: conclusions, figures, and the other blocks.
 pub fn to_page(
     about: &str,
     conclusions: impl IntoIterator<Item = Block>,
@@ -21,7 +21,7 @@ pub fn to_page(
     all.extend(conclusions);
     all.extend(Block::warnings(warnings()));
     all.extend(figures.into_iter().map(Block::Figure));
-    // But for the title of a terminal.
+    // Without the title for terminals.
     let is_title = |block: &Block| matches!(block, Block::Heading(1, _));
     all.extend(blocks.into_iter().filter(|block| !is_title(block)));
     all.extend(glossary(&all));
@@ -76,7 +76,7 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
     let speedups = texts.iter().filter(|text| text.starts_with("vs "));
     let speedups = speedups.map(|name| [name, "time of that structure / time of this one"]);
     let mut table = Table::of("column | meaning");
-    // The first meaning of a name is that of pages.
+    // The first meaning of a name is that for pages.
     let mut known = BTreeSet::new();
     let rows = meanings.filter(|row| occurs(row[0])).chain(speedups);
     for row in rows.filter(|row| known.insert(row[0])) {
@@ -88,5 +88,5 @@ pub fn glossary(blocks: &[Block]) -> Vec<Block> {
     }
 }
 
-/// Columns that are no metrics, and their meanings.
+/// Columns that are not metrics, and their meanings.
 const MEANINGS: &str = include_str!("assets/meanings.txt");

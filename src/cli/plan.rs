@@ -11,7 +11,7 @@ use super::text;
 use crate::camera::Camera;
 use crate::scene::{Regions, Scene, UpAxis};
 
-/// A drawing. Later classes of items are drawn over earlier ones of the same size.
+/// A drawing; later classes of items are drawn over earlier ones of the same size.
 pub struct Plan<'p> {
     pub caption: String,
     pub scene: &'p Scene,
@@ -27,12 +27,12 @@ const MOST_DRAWN: usize = 10_000;
 struct Drawn {
     rect: Rect,
     class: usize,
-    /// It lies around others and would cover them.
+    /// True if it surrounds others and would cover them.
     is_outlined: bool,
 }
 
 impl Plan<'_> {
-    /// The picture.
+    /// The drawing as SVG.
     pub fn svg(&self) -> String {
         let (mut items, mut notes) = self.items();
         let (cells, up) = (self.cells.as_ref(), self.scene.up);
@@ -61,7 +61,7 @@ impl Plan<'_> {
         sheet.finished(&self.caption, axes, &body, &self.legend(), &notes)
     }
 
-    /// The items to draw, and what is not drawn; empty where nothing is left out.
+    /// The items to draw, and notes about omitted ones; empty if there are none.
     fn items(&self) -> (Vec<Drawn>, Vec<String>) {
         let (origin, up) = (self.scene.origin, self.scene.up);
         let middle = self.scene.world_bounds();
@@ -115,8 +115,7 @@ impl Plan<'_> {
         rooms.filter(move |(min, max)| min.z <= z && z <= max.z)
     }
 
-    /// Draws the items, larger ones first: those that differ less than twice in length
-    /// by class.
+    /// Draws the items, larger ones first; within a factor of two in length, by class.
     fn draw_items(&self, items: &[Drawn], sheet: &Sheet, body: &mut String) {
         let mut order: Vec<_> = items.iter().collect();
         let size = |item: &Drawn| (longest(item.rect) * sheet.scale).max(1.0).log2() as i32;
@@ -186,8 +185,8 @@ fn counted<'c>(
 
 /// The part of the plane that is drawn.
 ///
-/// All cells, the eye if it is near, and the items, but for a few that are much larger
-/// than all others together.
+/// All cells, the eye if it is near, and the items, except a few much larger than all others
+/// together.
 fn window(items: &[Drawn], cells: impl Iterator<Item = Rect>, eye: Option<DVec2>) -> Rect {
     let bounds = items.iter().map(|item| item.rect).reduce(union);
     let bounds = bounds.unwrap_or_default();
@@ -217,7 +216,7 @@ fn outline_floors(items: &mut [Drawn], sheet: &Sheet) {
 
 /// Draws the edges of the view volume and the eye.
 ///
-/// Without a far plane the edges leave the sheet.
+/// Without a far plane the edges extend beyond the sheet.
 fn draw_camera(camera: &Camera, up: UpAxis, sheet: &Sheet, body: &mut String) {
     let camera = camera.unprojected().unwrap_or(*camera);
     let Camera { frame, lens } = &camera;

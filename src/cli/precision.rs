@@ -1,6 +1,7 @@
-//! `cullbench precision`: error against run time of a scene and path, and the
-//! sweeps over item size and ill-conditioned cameras behind it: tables, a figure, and
-//! what its figures say in sentences.
+//! `cullbench precision`: error against run time of a scene and path.
+//!
+//! With the sweeps over item size and ill-conditioned cameras: tables, a figure, and conclusions in
+//! sentences.
 
 use std::cmp::Ordering;
 
@@ -85,7 +86,7 @@ pub fn conclusions(p: &Precision) -> Vec<String> {
     of_points(p).into_iter().chain(others.flatten()).collect()
 }
 
-/// No visible item missed, a margin that is proven (docs/NUMERICS.md), and a time.
+/// No visible item missed, a proven margin (docs/NUMERICS.md), and a time.
 fn is_safe(point: &&Point) -> bool {
     let missed = point.counts.unwrap_or_default().dropped();
     point.time.is_some() && missed == 0 && point.names.epsilon > 0.0
@@ -143,7 +144,7 @@ fn of_points(p: &Precision) -> Vec<String> {
     all
 }
 
-/// The structure itself is at fault, so that its errors are not known.
+/// Returns true if the structure itself is wrong, so that its errors are unknown.
 pub fn is_wrong(point: &Point) -> bool {
     matches!(point.status, Status::Wrong | Status::Panicked)
 }
@@ -152,7 +153,7 @@ fn of_storage(p: &Precision) -> Option<String> {
     let memory = |point: &Point| point.memory_bytes_per_item;
     let mut sound = p.points.iter().filter(is_safe);
     let least = sound.clone().map(memory).min_by(f64::total_cmp)?;
-    // The fastest of those that need no more to speak of.
+    // The fastest of those within 1 % of the least memory.
     let least = sound.find(|point| memory(point) <= 1.01 * least)?;
     let (name, bytes) = (named(least), text::significant(memory(least)));
     let extra = extras(least);
@@ -180,7 +181,7 @@ fn of_sizes(rows: &[SweepRow]) -> Option<String> {
     })
 }
 
-/// Misses of the default over the sweeps of cameras, and the most of any over each.
+/// Misses of the default over the camera sweeps, and the most of any per sweep.
 fn of_cameras(rows: &[SweepRow]) -> Option<String> {
     let lost = |row: &SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
     let sweeps = SWEEPS.into_iter().filter(|sweep| sweep.0 != Sweep::Size);
@@ -234,7 +235,7 @@ pub fn figure(p: &Precision) -> Option<Figure> {
 
 /// The Pareto front within `room` characters.
 ///
-/// With `all` the errors of every culling and the sweeps too.
+/// With `all` also the errors of every culling and the sweeps.
 fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
     let visible = p.points.iter().find_map(|point| point.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
@@ -296,12 +297,12 @@ pub fn named(point: &Point) -> String {
     format!("{} with {}", structure(point), culling(&point.names))
 }
 
-/// A culling in short.
+/// Short name of a culling.
 pub fn culling(names: &Names) -> String {
     format!("{} {}", names.test, numbers(names))
 }
 
-/// Numbers, planes where they are not the frame's, and epsilon.
+/// Arithmetic, planes if they are not the frame's, and epsilon.
 pub fn numbers(names: &Names) -> String {
     let arithmetic = names.arithmetic;
     let planes = Some(names.planes).filter(|planes| *planes != "frame");
@@ -311,7 +312,7 @@ pub fn numbers(names: &Names) -> String {
     format!("{arithmetic}{planes}{epsilon}")
 }
 
-/// Errors of each culling, the same on every structure.
+/// Errors of each culling, the same for every structure.
 fn errors_table(points: &[Point]) -> Table {
     let all = grouped(points.iter().map(|p| (&p.names, p)));
     let mut points: Vec<&Point> = all.iter().map(|(_, own)| own[0]).collect();
@@ -329,9 +330,9 @@ fn errors_table(points: &[Point]) -> Table {
     Table::with(points, columns)
 }
 
-/// A row for those of one structure, test, arithmetic and errors.
+/// A row for points of one structure, test, arithmetic and errors.
 ///
-/// It shows the fastest that is safe by its margin, or the fastest; with `all` a row each.
+/// Shows the fastest that is safe by its margin, else the fastest; with `all` a row each.
 fn front_table(p: &Precision, all: bool) -> Table {
     let key = |i: usize| {
         let point = &p.points[i];
@@ -368,7 +369,7 @@ fn structure(point: &Point) -> String {
     name.unwrap_or_default().to_owned()
 }
 
-/// A value of a sweep: as a power of two where it is a large one.
+/// A value of a sweep; a large power of two as such.
 pub fn swept(value: f64) -> String {
     match value {
         power if power >= 1024.0 && power.log2().fract() == 0.0 => format!("2^{}", power.log2()),
@@ -377,12 +378,12 @@ pub fn swept(value: f64) -> String {
     }
 }
 
-/// Table of the cullings that have any error, and a line on the others.
+/// Table of the cullings with errors, and a line about the others.
 fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
     type Named = fn(&Names) -> String;
     let ([header, nothing, unit], name): (_, Named) = match rows[0].sweep {
         Sweep::Size => (["culling", "No false positives", "%"], culling),
-        // All are of one test.
+        // All have the same test.
         _ => (["six-plane", "Nothing missed", "ppm"], numbers),
     };
     let all = grouped(rows.iter().map(|row| (&row.names, *row)));

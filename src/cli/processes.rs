@@ -1,5 +1,7 @@
-//! The parent's side of what is measured over processes: starting a worker, reading
-//! what it says, and telling what has ended it: memory, time, a signal, or the user.
+//! The parent's side of measurements over processes.
+//!
+//! Starts a worker, reads its messages, and determines what ended it: memory, time, a signal, or
+//! the user.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -22,18 +24,18 @@ use crate::measure::{Part, ProcessTimes, Share, Status, TaskSamples, Verdict};
 use crate::report::temporary_in;
 use crate::shown::shortened;
 
-/// Longest wait before looking whether the user wants to stop.
+/// Longest wait before checking for a request to stop.
 const GLANCE: Duration = Duration::from_millis(20);
-/// Step of a worker that has not told any.
+/// Step of a worker that has not reported any.
 const STARTING: &str = "starting";
-/// Bytes of a worker's last words.
+/// Most bytes kept of a worker's last output.
 const LAST_WORDS: usize = 4096;
 
 /// Longest first line of a worker, bytes: another program may never end its first.
 const LONGEST_FIRST: u64 = 1 << 16;
 /// Longest line, bytes: the samples of a million cameras fit.
 const LONGEST: u64 = 1 << 29;
-/// Lines that wait to be read before the worker does.
+/// Most unread lines before the worker must wait.
 const WAITING: usize = 16;
 
 /// The process of a worker died at this structure, with this verdict.
@@ -43,29 +45,28 @@ const WAITING: usize = 16;
     .1.reason.as_deref().unwrap_or_default())]
 pub struct Died(pub Option<String>, pub Verdict);
 
-/// Between two looks at a worker; longer, and its parent was stopped.
+/// Longest time between two checks of a worker; beyond, the parent was suspended.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
 
-/// A worker at work.
+/// A running worker.
 pub struct Worker {
     child: Child,
-    /// Kept open: its end tells the worker that its parent is gone.
+    /// Kept open: its end signals the worker that its parent is gone.
     _stdin: Option<ChildStdin>,
     lines: Receiver<io::Result<Vec<u8>>>,
     last_words: Option<JoinHandle<Vec<u8>>>,
     doing: (Option<String>, String),
-    /// Since the last message, but for what this process did not run itself (Ctrl-Z).
+    /// Time since the last message, without suspensions of this process (Ctrl-Z).
     waited: Duration,
     looked: Instant,
     pub patience: Duration,
 }
 
 impl Worker {
-    /// Waits for the next message; none within `wait`.
+    /// Waits for the next message; `None` without one within `wait`.
     ///
-    /// # Errors
-    /// A message that no worker of this version sends, or that its scene cannot be had;
-    /// [`Died`], seen or made.
+    /// # Errors A message that no worker of this version sends, or that its scene cannot be loaded;
+    /// [`Died`], whether observed or caused here.
     pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Message>> {
         let gap = std::mem::replace(&mut self.looked, Instant::now()).elapsed();
         self.waited += gap.min(LONGEST_GAP);
@@ -75,7 +76,7 @@ impl Worker {
             Err(ended) => {
                 let (structure, step) = self.doing.clone();
                 let verdict = if ended == RecvTimeoutError::Timeout {
-                    // Its current step is what took too long.
+                    // Its current step took too long.
                     self.kill();
                     let reason = format!("{step} took longer than {} s", self.patience.as_secs());
                     Verdict::new(Status::TimedOut, reason)
@@ -95,7 +96,7 @@ impl Worker {
         let message = serde_json::from_slice(&line).map_err(|_| {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
-            // A worker that has told what it does speaks the protocol.
+            // A worker that has reported a step uses the same protocol.
             let is_first = self.doing.1 == STARTING;
             let why = ["", ": the program is of another version"][usize::from(is_first)];
             anyhow::anyhow!(
@@ -120,7 +121,7 @@ impl Worker {
         let _ = self.child.wait();
     }
 
-    /// Stops the process or lets it continue; without such signals it runs on.
+    /// Suspends or resumes the process; systems without such signals let it run.
     pub fn hold(&self, is_held: bool) {
         #[cfg(unix)]
         if let Some(pid) = rustix::process::Pid::from_raw(self.child.id().cast_signed()) {
@@ -140,7 +141,7 @@ impl Drop for Worker {
 
 /// Verdict on a process that ended by itself.
 fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
-    // The allocator of std says this before it aborts.
+    // The allocator of std prints this before it aborts.
     if let Some(at) = words.find("memory allocation of") {
         let said = words[at..].lines().next().unwrap_or_default();
         return Verdict::new(Status::OutOfMemory, format!("while {step}: {said}"));
@@ -156,7 +157,7 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
         };
     }
     let last = words.lines().rev().find(|line| !line.trim().is_empty());
-    // Hints on backtraces follow the message of a panic.
+    // Hints about backtraces follow the message of a panic.
     let is_before = |line: &&str| !line.contains(" panicked at ");
     let last = words.lines().skip_while(is_before).nth(1).or(last);
     let last = last.map(|last| format!(": {last}")).unwrap_or_default();
@@ -164,22 +165,21 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     Verdict::new(Status::Panicked, reason)
 }
 
-/// A program, with what all its workers are given.
+/// A program, with the common input of all its workers.
 pub struct Workers {
     pub program: PathBuf,
     args: Vec<String>,
     patience: Duration,
     cpus: Vec<usize>,
-    /// Bytes of pipes, for workers to read.
+    /// Files with the bytes of pipes, for workers to read.
     spooled: BTreeMap<String, PathBuf>,
     _spool: Vec<NamedTempFile>,
 }
 
 impl Workers {
-    /// Workers of this program; files in `folder` stand for pipes.
+    /// Workers of this program; files in `folder` replace pipes.
     ///
-    /// # Errors
-    /// Such a file cannot be written.
+    /// # Errors Such a file cannot be written.
     pub fn new(args: Vec<String>, patience: Duration, folder: &Path) -> anyhow::Result<Workers> {
         let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
         for (source, bytes) in input::pipes() {
@@ -200,17 +200,16 @@ impl Workers {
         })
     }
 
-    /// Those of another program, on the last processor.
+    /// The same workers of another program, on the last processor.
     pub fn of(mut self, program: &Path) -> Workers {
         self.program = program.to_owned();
         self.cpus.drain(..self.cpus.len().saturating_sub(1));
         self
     }
 
-    /// Starts a worker on the next processor; `layout` places its memory.
+    /// Starts a worker on the next processor; `layout` determines its memory layout.
     ///
-    /// # Errors
-    /// The program cannot be started.
+    /// # Errors The program cannot be started.
     pub fn start(&self, process: u32, layout: u64, job: Job) -> anyhow::Result<Worker> {
         let request = Request {
             protocol: PROTOCOL,
@@ -222,8 +221,8 @@ impl Workers {
             layout,
         };
         let mut command = Command::new(&self.program);
-        // Ctrl-C of a terminal goes to a whole group, and would end a worker that has no
-        // handler yet: its cells would have failed for good.
+        // A terminal sends Ctrl-C to a whole group, and would end a worker that has no handler yet:
+        // its cells would count as failed.
         #[cfg(unix)]
         {
             use std::os::unix::process::CommandExt;
@@ -242,7 +241,7 @@ impl Workers {
                 let mut out = BufReader::new(out);
                 for most in iter::once(LONGEST_FIRST).chain(iter::repeat(LONGEST)) {
                     let mut line = Vec::new();
-                    // A line that is cut short is no message.
+                    // A truncated line is not a message.
                     let read = (&mut out).take(most).read_until(b'\n', &mut line);
                     let ended = read.is_err();
                     if matches!(read, Ok(0)) || send.send(read.map(|_| line)).is_err() || ended {
@@ -280,8 +279,7 @@ impl Workers {
 
     /// Runs a job in a separate process, on the next processor.
     ///
-    /// # Errors
-    /// The program cannot be started; those of [`Worker::listen`]; what `keep` says;
+    /// # Errors The program cannot be started; the errors of [`Worker::listen`] and of `keep`;
     /// [`interrupt::Interrupted`].
     pub fn see_through(
         &self,
@@ -305,10 +303,9 @@ impl Workers {
         }
     }
 
-    /// Runs a job; what `pick` takes of its messages.
+    /// Runs a job; returns what `pick` selects from its messages.
     ///
-    /// # Errors
-    /// The errors of [`Workers::see_through`].
+    /// # Errors The errors of [`Workers::see_through`].
     pub fn found<T>(
         &self,
         process: u32,
@@ -326,7 +323,7 @@ impl Workers {
     }
 }
 
-/// This very program; on Linux also when another has taken its place.
+/// The running program; on Linux even if its file has been replaced.
 fn own_program() -> anyhow::Result<PathBuf> {
     let named = std::env::current_exe();
     #[cfg(target_os = "linux")]
@@ -335,7 +332,7 @@ fn own_program() -> anyhow::Result<PathBuf> {
         let running = PathBuf::from("/proc/self/exe");
         let file = |path: &Path| path.metadata().ok().map(|file| (file.dev(), file.ino()));
         let held = file(&running);
-        // Under an emulator, such as valgrind, what runs is another program than the named.
+        // Under an emulator, such as valgrind, the running program is not the named one.
         let is_other = |own: &PathBuf| own.exists() && file(own) != held;
         if held.is_some() && !named.as_ref().is_ok_and(is_other) {
             return Ok(running);
@@ -344,7 +341,7 @@ fn own_program() -> anyhow::Result<PathBuf> {
     named.context("this program cannot be found again")
 }
 
-/// The processors that this process may run on; empty where that is not known.
+/// The processors that this process may run on; empty if unknown.
 fn processors() -> Vec<usize> {
     #[cfg(target_os = "linux")]
     if let Ok(set) = rustix::thread::sched_getaffinity(None) {
@@ -354,41 +351,41 @@ fn processors() -> Vec<usize> {
     Vec::new()
 }
 
-/// Raised when requests or messages change: programs of different versions do
-/// not understand each other.
+/// Version of requests and messages.
+///
+/// Raised when they change: programs of different versions do not understand each other.
 pub const PROTOCOL: u32 = 7;
 
 /// Work of one process.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Request {
-    /// Told for a worker of another version; its first line is what is compared.
+    /// Sent for workers of other versions; the worker's first line is what is compared.
     pub protocol: u32,
-    /// The arguments of the command, from which all else follows.
+    /// The arguments of the command, from which everything else follows.
     pub args: Vec<String>,
-    /// Files that stand for pipes that only the parent can read.
+    /// Files that replace pipes, which only the parent can read.
     pub spooled: BTreeMap<String, PathBuf>,
-    /// SHA-256 of the files that the parent has read, to be found the same.
+    /// SHA-256 of the files that the parent has read; the worker must find the same.
     pub files: BTreeMap<String, String>,
     pub job: Job,
-    /// The processor to stay on.
+    /// The processor to run on.
     pub cpu: Option<usize>,
-    /// Decides on where its memory lies: another number for every process.
+    /// Seed of its memory layout, different for every process.
     pub layout: u64,
 }
 
-/// One process's share of what a command measures.
+/// One process's share of a command's measurement.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Job {
-    /// Structures on a scene, by its index in the plan (`run`, `compare`,
-    /// `advise`).
+    /// Structures on a scene, by its index in the plan (`run`, `compare`, `advise`).
     Scene {
         scene: usize,
         share: Share,
-        /// True to receive samples beside the parts.
+        /// True to receive samples in addition to the parts.
         samples: bool,
     },
-    /// All that a study times.
+    /// All timed tasks of a study.
     Times(Timing),
 }
 
@@ -434,14 +431,14 @@ pub enum Message {
     },
     Part(Box<Part>, Vec<TaskSamples>),
     Times(ProcessTimes),
-    /// The scene or a path cannot be had.
+    /// The scene or a path cannot be loaded.
     Failed(String),
-    /// The share is done.
+    /// The share is complete.
     Done,
 }
 
 impl Message {
-    /// The part that it brings.
+    /// The part in the message, if it has one.
     pub fn part(self) -> Option<Part> {
         match self {
             Message::Part(part, _) => Some(*part),

@@ -1,4 +1,4 @@
-//! Name and version of the program, which may be another crate's, and its words.
+//! Name and version of the program, which may be another crate's, and its messages.
 
 use std::env;
 use std::error::Error;
@@ -16,7 +16,7 @@ static PROGRAM: OnceLock<(String, String)> = OnceLock::new();
 
 const OWN: (&str, &str) = (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
 
-/// Names the program, once; `None` takes the name of its file and no version.
+/// Sets name and version, once; `None` takes the name of its file and no version.
 pub fn set(program: Option<(&str, &str)>) {
     let file = env::args_os().next().unwrap_or_default();
     let of_file = Path::new(&file).file_stem().unwrap_or_default();
@@ -34,7 +34,7 @@ pub fn name() -> &'static str {
     PROGRAM.get().map_or(OWN.0, |(name, _)| name)
 }
 
-/// Version of the program; beside another crate's own, that of this one.
+/// Version of the program; for another crate's, also that of this crate.
 pub fn version() -> &'static str {
     PROGRAM.get().map_or(OWN.1, |(_, version)| version)
 }
@@ -47,7 +47,7 @@ pub fn source() -> Source {
     }
 }
 
-/// A help text with commands of this program.
+/// A help text with the name of this program in its commands.
 pub fn named(text: &str) -> String {
     text.replace(OWN.0, name())
 }
@@ -68,8 +68,9 @@ fn value(error: &clap::Error) -> Option<String> {
     })
 }
 
-/// The error on one line; `None` for requested help or version, and for the help in
-/// place of a missing command.
+/// The error on one line.
+///
+/// `None` for requested help or version, and for the help in place of a missing command.
 pub fn one_line(error: &clap::Error) -> Option<String> {
     let no_command = ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
     if !error.use_stderr() || error.kind() == no_command {
@@ -95,7 +96,7 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
         let similar = tip.filter(|tip| tip.contains("similar"));
         let values = line.strip_prefix("[possible values: ");
         if let Some((_, names)) = similar.and_then(|tip| tip.split_once(": ")) {
-            // Those of clap need not be alike.
+            // clap's own suggestions may be dissimilar.
             let word = found.split('\'').nth(1).unwrap_or_default();
             if let Some(name) = nearest(word, names.split('\'').skip(1).step_by(2)) {
                 expected.get_or_insert(format!("; did you mean '{name}'?"));
@@ -106,7 +107,7 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
             let values = values.trim_end_matches(']');
             expected = Some(format!("; expected one of {values}"));
         } else if let Some(line) = line.strip_prefix("Usage: ") {
-            // What may be left out may not go with the rest.
+            // Optional parts may not be valid together with the rest.
             let words = line.split(' ');
             let words = words.filter(|word| !word.starts_with('[') || *word == "[OPTIONS]");
             usage = Some(words.collect::<Vec<_>>().join(" "));

@@ -1,6 +1,7 @@
-//! `cullbench query` and `cullbench locate`: one row per camera, point or box, and
-//! structure. One structure answers after another: a large scene does not fit in memory
-//! several times.
+//! `cullbench query` and `cullbench locate`: a row per camera, point or box.
+//!
+//! One per structure, too. Structures answer one after another: a large scene does not fit in
+//! memory several times.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
@@ -21,7 +22,7 @@ use crate::query::{ItemId, QueryCost};
 use crate::scene::{Scene, Sought, SoughtBox, available_bytes, read_sought_boxes_csv};
 use crate::threads::share;
 
-/// Points that are the camera places of the scene.
+/// Value of `--points` for the camera places of the scene.
 const PLACES: &str = "places";
 
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
@@ -68,13 +69,13 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     Ok(Ending::of(agree))
 }
 
-/// The ids of an answer as files have them.
+/// The ids of an answer in the numbering of files.
 fn shown(scene: &Scene, row: &Row) -> Option<Vec<ItemId>> {
     let ids = row.ids.as_deref()?;
     Some(ids.iter().map(|&id| scene.row_of(id)).collect())
 }
 
-/// Counts a query with a camera's view, then returns the ids of the plain query.
+/// Counts a query with a camera's view; returns the ids of the uncounted query.
 pub fn frustum(
     workload: &Workload,
 ) -> impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync {
@@ -143,17 +144,17 @@ fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
     Ok(boxes.into_iter().map(|b| scene.sought_box(b)).collect())
 }
 
-/// One structure's answer to one question.
+/// One structure's answer to one query.
 pub struct Row {
     pub question: usize,
     pub structure: String,
     /// Items, ascending.
     pub ids: Option<Box<[ItemId]>>,
     pub answer: Answer,
-    /// Sum of the ids as files have them.
+    /// Sum of the ids in the numbering of files.
     pub id_sum: u64,
     pub cost: QueryCost,
-    /// An id of the answer that no item has.
+    /// An id in the answer that belongs to no item.
     stray: Option<ItemId>,
 }
 
@@ -172,14 +173,14 @@ impl Row {
 /// Bytes of answers in memory: enough that a structure is rarely built again.
 const HELD: usize = 64 << 20;
 
-/// Answers every question by every structure.
+/// Answers every query by every structure.
 ///
-/// False if two structures disagree, or an id is no item's. Nothing is compared with the
+/// False if two structures disagree, or an id belongs to no item. Nothing is compared with the
 /// reference scan, which takes far longer.
 ///
-/// `each` receives the answers in the order of questions, then of structures, in blocks of
-/// [`HELD`] bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every disagreement is a
-/// line on standard error.
+/// `each` receives the answers in the order of queries, then of structures, in blocks of [`HELD`]
+/// bytes, or an eighth of the free memory. Ids (ascending) are kept only with `keep_ids`. Every
+/// disagreement is a line on standard error.
 pub fn ask_all(
     structures: &[StructureSpec],
     scene: &Scene,
@@ -192,7 +193,7 @@ pub fn ask_all(
     let block = (HELD / size_of_val(boxes).max(1)).clamp(1, 1024);
     let (mut from, mut agree) = (0, true);
     let room = available_bytes().map_or(HELD, |free| HELD.min(free as usize / 8));
-    // A single structure is built once; of several there may be memory for one.
+    // A single structure is built once; of several, memory may hold only one.
     let mut only: Option<Box<dyn DynIndex>> = None;
     while from < questions {
         let mut answers: Vec<Vec<Row>> = Vec::new();
@@ -201,7 +202,7 @@ pub fn ask_all(
             let build = || spec.build(input_of(scene, boxes));
             let index = match only.take().map_or_else(build, Ok) {
                 Ok(index) => index,
-                // One of many: the others' answers are worth having.
+                // One of many: the others' answers are still useful.
                 Err(error @ (BuildError::Refused { .. } | BuildError::OutOfMemory { .. }))
                     if structures.len() > 1 =>
                 {
@@ -212,7 +213,7 @@ pub fn ask_all(
                 }
                 Err(error) => return Err(failed(error.to_string())),
             };
-            // The first structure finds how many questions' answers there is room for.
+            // The first structure determines for how many queries the answers fit.
             let (mut held, first) = (0, answers.is_empty());
             let end = [from + answers.len(), questions][usize::from(first)];
             let mut next = from;
@@ -261,7 +262,7 @@ pub fn ask_all(
     Ok(agree)
 }
 
-/// Reports ids that are no item's, and questions with different answers.
+/// Reports ids that belong to no item, and queries with different answers.
 ///
 /// True if there is nothing to report.
 fn all_agree(rows: &[Row], what: &str) -> bool {
@@ -289,11 +290,12 @@ fn all_agree(rows: &[Row], what: &str) -> bool {
     agree
 }
 
-/// Head and cell of a column.
+/// Header and cell of a column.
 pub type Column<'a, Row> = (&'a str, &'a dyn Fn(&Row) -> Value);
 
 /// Writes the answers that `ask` passes to its argument as CSV or JSON.
-/// A reader who leaves early changes neither questions nor answers.
+///
+/// A reader that stops early changes neither queries nor answers.
 pub fn write(
     format: RowFormat,
     columns: &[Column<'_, Row>],
@@ -301,7 +303,7 @@ pub fn write(
 ) -> anyhow::Result<bool> {
     let mut out = BufWriter::new(io::stdout().lock());
     let mut before = "[";
-    // The head comes with the first rows: an error before them is all that is said.
+    // The header comes with the first rows: an error before them is the only output.
     let mut head = Some(columns.iter().map(|column| column.0));
     let mut put = |rows: &[Row]| -> io::Result<()> {
         if format == RowFormat::Csv {
@@ -323,7 +325,7 @@ pub fn write(
     };
     let agree = ask(&mut |rows| unread_is_fine(put(&rows)));
     if agree.is_err() {
-        // No answers but a beginning: it is not shown.
+        // The output is incomplete: what is still buffered is not shown.
         drop(out.into_parts());
         return agree;
     }
@@ -336,7 +338,7 @@ pub fn write(
     agree
 }
 
-/// A value as CSV holds it: ids separated by spaces, nothing for null.
+/// A value in CSV: ids separated by spaces, empty for null.
 pub fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
@@ -398,7 +400,7 @@ mod tests {
     fn answers_too_large_to_be_held_come_in_order_and_in_pieces() {
         let scene = crate::scene::load("uniform:n=10k", &Default::default()).expect("uniform");
         let two = [of(REFUSES), StructureSpec::parse("linear").expect("linear")];
-        // Of two thousand answers there is more than is held.
+        // Two thousand answers exceed the buffer.
         let many: Vec<ItemId> = (0..HELD as ItemId / 8000).collect();
         for structures in [&two[1..], &two[..]] {
             let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {

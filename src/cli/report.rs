@@ -1,6 +1,7 @@
-//! `cullbench report`: the results of a run as Markdown, pictures or one HTML page,
-//! from its report.json, or in the Bencher Metric Format (bencher.dev); their summary on
-//! the terminal, at the end of `run`; the page of several runs, oldest first.
+//! `cullbench report`: the results of a run, from its report.json.
+//!
+//! Output is Markdown, pictures, one HTML page, or in the Bencher Metric Format (bencher.dev); the
+//! summary on the terminal, at the end of `run`; the page of several runs, oldest first.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -78,7 +79,7 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// The page of a run; `folder` has its stream and samples, and `why` is of `--why`.
+/// The page of a run; `folder` has its stream and samples, `why` is from `--why`.
 fn page(report: &Report, folder: &Path, why: Vec<Block>) -> String {
     let mut blocks = blocks(report, &views(folder, report));
     if !why.is_empty() {
@@ -97,7 +98,7 @@ pub fn write_page(report: &Report, folder: &Path, why: Vec<Block>) -> anyhow::Re
     Ok(save_page(folder, &page(report, folder, why), &pictures)?)
 }
 
-/// All of them, or no folder that was not there before.
+/// Writes all of them, or removes a folder it has created.
 fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     let is_new = !folder.exists();
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -240,7 +241,7 @@ fn about(report: &Report) -> Vec<String> {
 
 /// Shows the basis of a run, warnings, the next command, and the files written.
 ///
-/// `how` is behind the number of cells: how long they took, or whence they are.
+/// `how` follows the number of cells: how long they took, or their source.
 pub fn close(
     report: &Report,
     how: &str,
@@ -276,7 +277,7 @@ pub fn close(
 const METRICS: &str = "query_ns locate_ns build_ms nodes_tested items_tested planes_tested \
                        memory_bytes_per_item frame_ns worst_frame_ns";
 
-/// One benchmark per right cell, named for structure and question.
+/// One benchmark per right cell, named after structure and query.
 fn bencher(report: &Report) -> serde_json::Result<String> {
     let cells = report.cells.iter().filter(|cell| cell.status == Status::Ok);
     let benchmarks = cells.map(|cell| {
@@ -287,7 +288,7 @@ fn bencher(report: &Report) -> serde_json::Result<String> {
                 value["lower_value"] = json!(lower);
                 value["upper_value"] = json!(upper);
             }
-            // Bencher has `latency` in ns by itself.
+            // Bencher has a built-in `latency` in ns.
             let name = metric.replace("query_ns", "latency").replace('_', "-");
             Some((name, value))
         });
@@ -299,7 +300,7 @@ fn bencher(report: &Report) -> serde_json::Result<String> {
     serde_json::to_string_pretty(&benchmarks.collect::<Map<_, _>>()).map(|text| text + "\n")
 }
 
-/// Digits of a commit that name it.
+/// Digits of a commit's short name.
 const COMMIT: usize = 7;
 
 /// Commit, or the day of a run without one.
@@ -312,7 +313,7 @@ fn run_name(report: &Report) -> String {
     name.chars().take(digits).collect::<String>() + dirty
 }
 
-/// Names of the runs; with start and digits of the id where two are the same.
+/// Names of the runs; with start and digits of the id if two are equal.
 fn names(reports: &[Report]) -> Vec<String> {
     let started = |run: &usize| {
         let RunInfo { started_at, id, .. } = &reports[*run].run;
@@ -343,7 +344,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
         for (structure, cells) in grouped(cells.into_iter()) {
             let sound = cells.iter().filter(|(_, cell)| cell.rank.is_some());
             let last = sound.clone().next_back().map(|(_, cell)| *cell);
-            // The same name does not make it the same question.
+            // The same name does not imply the same query.
             let differs = |cell| {
                 let pair = (cell, last?);
                 let all = [asked_otherwise, answered_otherwise, timed_otherwise];
@@ -420,7 +421,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
     to_html(&title, &all)
 }
 
-/// Changes from first to last times, and what else differs between these runs.
+/// Changes from first to last times, and other differences between these runs.
 ///
 /// Times of two runs one after the other differ for the machine's sake alone: no change is
 /// counted or named.
@@ -485,13 +486,13 @@ mod tests {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/results/reference/report.json");
         let report = read_report(file.as_ref()).unwrap();
         let told = to_terminal(&shown(&report, false, 80), 80);
-        // Basis, warnings, files and the next command are below.
+        // Basis, warnings, files and the next command follow below.
         assert!((20..=48).contains(&told.lines().count()), "{told}");
         assert!(
             told.lines().all(|line| line.chars().count() <= 80),
             "{told}"
         );
-        // Builds and updates are the least certain figures.
+        // Builds and updates are the least precise figures.
         let full = to_terminal(&shown(&report, true, 80), 80);
         for time in ["5.55 ms ± 10 %", "146 us [68.0, 313]"] {
             assert!(full.contains(time) && !told.contains(time), "{full}");

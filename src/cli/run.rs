@@ -1,6 +1,7 @@
-//! `cullbench run`, the main job: plan, measure in processes of its own, keep every
-//! finished part on disk, show the conclusion. `cullbench merge`: the shards of a plan
-//! become one run.
+//! `cullbench run`, the main job, and `cullbench merge`.
+//!
+//! `run` plans, measures in separate processes, keeps every finished part on disk, and shows the
+//! conclusion; `merge` joins the shards of a plan into one run.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -49,7 +50,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     check_why(args, &plan)?;
     plan.check_inputs()?;
     if args.plan {
-        // The cells as JSON lines, nothing measured.
+        // The cells as JSON lines; nothing is measured.
         let mut out = io::stdout().lock();
         for cell in plan.plan.cells() {
             writeln!(out, "{}", serde_json::to_string(&cell)?)?;
@@ -68,7 +69,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> Result<Ending> {
     Run::new(args, plan.plan, folder, stream)?.all()
 }
 
-/// Refuses the explanation of a structure that is not measured.
+/// Refuses to explain a structure that is not measured.
 fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
     let labels = plan.plan.structures.iter().map(|spec| spec.label.as_str());
     let labels: Vec<&str> = labels.collect();
@@ -80,7 +81,7 @@ fn check_why(args: &RunArgs, plan: &RunPlan) -> Result<()> {
     Ok(())
 }
 
-/// A run on its way.
+/// A run in progress.
 struct Run<'a> {
     args: &'a RunArgs,
     plan: Plan,
@@ -89,9 +90,9 @@ struct Run<'a> {
     workers: Workers,
     bar: ProgressBar,
     started: Instant,
-    /// When a line told of the progress.
+    /// Time of the last line about the progress.
     told: Instant,
-    /// True where a part of the run was there before.
+    /// True if a part of the run existed before.
     resumes: bool,
 }
 
@@ -102,8 +103,7 @@ impl<'a> Run<'a> {
         let patience = Duration::from_secs(args.what.timeout);
         Ok(Run {
             bar: progress(left, ""),
-            // Files in the run's folder: what a killed run leaves is taken away by
-            // the next.
+            // Files in the run's folder: the next run removes those that a killed run leaves.
             workers: Workers::new(stream.header.args.clone(), patience, &folder.path)?,
             started: Instant::now(),
             told: Instant::now(),
@@ -115,17 +115,17 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Measures all scenes; keeps a finished run as the baseline that the options name.
+    /// Measures all scenes; saves a finished run as the baseline that the options name.
     fn all(mut self) -> Result<Ending> {
-        // The processes of a scene are spread over the run: another program that takes the
-        // caches for some seconds meets one process of every scene, not all of one.
+        // The processes of a scene are spread over the run: another program that occupies the
+        // caches for some seconds affects one process of every scene instead of all of one.
         let scenes = 0..self.plan.scenes.len();
         let processes = 0..self.plan.effort.processes;
         let mut all = processes.flat_map(|process| scenes.clone().map(move |s| (s, process)));
         let measured = all.try_for_each(|(scene, process)| self.process(scene, process));
         self.bar.finish_and_clear();
         let stopped = measured.is_err();
-        // After an error what was measured stays, and no empty folder.
+        // After an error measured parts are kept, but not an empty folder.
         let failed = measured.err().filter(|error| !error.is::<Interrupted>());
         if self.stream.parts.is_empty() {
             drop(self.workers);
@@ -144,14 +144,14 @@ impl<'a> Run<'a> {
         let (name, folder) = (program::name(), self.folder.path.display().to_string());
         let again = format!("{name} run --resume --out {}", text::quoted(&folder));
         if let Some(error) = failed {
-            // A part of the cells makes no conclusion; what is on disk stays.
+            // A part of the cells gives no conclusion; files on disk are kept.
             let _ = save_report(&self.folder.path, &report);
             if error.chain().any(|cause| cause.is::<io::Error>()) {
                 tell!("note: finished cells were saved; continue with {again}");
             }
             return Err(error);
         }
-        // Tables before files: where a file cannot be written, what was measured is seen.
+        // Tables before files: if a file cannot be written, the results are still seen.
         let mut blocks = shown(&report, self.args.all_columns, text::width());
         let why = || self.args.why.iter();
         let why = || why().flat_map(|structure| run_why::blocks(&report, structure));
@@ -172,7 +172,7 @@ impl<'a> Run<'a> {
         Ok(Ending::of(!report.has_failed()))
     }
 
-    /// One process of a scene, and others in place of those that a structure ends.
+    /// One process of a scene, restarted after a structure has ended it.
     fn process(&mut self, scene: usize, process: u32) -> Result<()> {
         let planned = self.plan.scenes[scene].clone();
         let keys = self.plan.keys_of(&planned);
@@ -193,7 +193,7 @@ impl<'a> Run<'a> {
                 Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
                     failed.insert(structure, verdict);
                 }
-                // Not any structure's doing, as far as one can tell.
+                // Not attributable to a structure.
                 Died(_, verdict) => return self.fail_all(&failed, &keys, process, &verdict),
             }
         }
@@ -235,7 +235,7 @@ impl<'a> Run<'a> {
         self.workers.see_through(process, job, &mut keep, &step)
     }
 
-    /// Every cell of what is still wanted gets this verdict.
+    /// Gives every cell that is still wanted this verdict.
     fn fail_all(
         &mut self,
         failed: &BTreeMap<String, Verdict>,
@@ -243,7 +243,7 @@ impl<'a> Run<'a> {
         process: u32,
         verdict: &Verdict,
     ) -> Result<()> {
-        // A group that cannot be had is not tried again by the processes after this one.
+        // Later processes do not try a failed group again.
         let later = process..self.plan.effort.processes;
         let missed = keys.iter().filter(|key| !self.stream.has(key, process));
         let missed = missed.flat_map(|key| later.clone().map(move |process| (key, process)));
@@ -279,15 +279,16 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Options of a run that the command after it repeats.
+/// Options of a run that the suggested command repeats.
 ///
-/// They decide how files are read, what a frame of moving items is, and the threads and
+/// They determine how files are read, what a frame of moving items is, and the threads and
 /// instructions of a query.
 const KEPT: &str =
     "up items views update threads kernel skip-bad-items matrix-convention fovy aspect near far";
 
-/// The command that a reader will want next, with what it gives if that fits into
-/// `width` characters; `None` where nothing is ranked.
+/// The next command that a reader will want, with its purpose if that fits.
+///
+/// Within `width` characters. `None` if nothing is ranked.
 fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
     let program = report.run.command.split(' ').next()?;
     let all = comparisons(report);
@@ -297,7 +298,7 @@ fn next(report: &Report, args: &[String], width: usize) -> Option<String> {
         return Some(format!("next    {program} run --scene FILE  {gives}"));
     }
     let option = |(name, value, usual): (&str, &String, &str)| {
-        // A value that begins with a minus needs the sign.
+        // A value that starts with a minus needs `=`.
         let sign = if value.starts_with('-') { "=" } else { " " };
         (value != usual).then(|| format!("--{name}{sign}{}", text::quoted(value)))
     };
@@ -331,7 +332,7 @@ pub fn merge(args: &MergeArgs) -> Result<Ending> {
     let mut first: Option<Vec<String>> = None;
     for path in &args.runs {
         let other = read_stream(&path.join("stream.jsonl"))?.0.header.args;
-        // The first as well: its own options may be none.
+        // The first too: its own options may be invalid.
         let first = first.get_or_insert_with(|| other.clone());
         same_recorded(first, &other).with_context(|| path.display().to_string())?;
     }

@@ -1,7 +1,7 @@
 //! Figures of a run: speed-ups, growth, views along the path, error against time.
 //!
-//! Error against time has a mark per structure and test, the Pareto front before them, and
-//! the tests named at their levels of error.
+//! Error against time has a mark per structure and test, the Pareto front before them, and the
+//! tests named at their levels of error.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::text;
 use crate::report::{Comparison, Reading, ReportCell, Views, grouped};
 use crate::statistics::{Estimate, quantile, sorted};
 
-/// Least number of clock readings along a path for a line, and for quantiles.
+/// Fewest clock readings along a path for a line, and for quantiles.
 const LEAST_READINGS: [usize; 2] = [4, 20];
 
 /// Scene, path and motion of a comparison.
@@ -25,7 +25,7 @@ pub fn of(comparison: &Comparison) -> String {
 
 /// Speed-ups over `base`: a dot with its 95 % interval per structure.
 ///
-/// The fastest is on top. Lines join the dots of one rank.
+/// The fastest is on top. Lines connect the dots of one rank.
 pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let sound = comparison.sound();
     let all = sound.filter_map(|cell| Some((cell, comparison.speedup(base, cell)?)));
@@ -35,7 +35,7 @@ pub fn speedups(comparison: &Comparison, base: &str) -> Option<Figure> {
     let values = drawn.iter();
     let values = values.flat_map(|(_, found)| found.ends().unwrap_or([found.value; 2]));
     let mut axis = Axis::log("", values.chain([1.0]), 1.2, &ratio_name);
-    // Within an octave there is but one.
+    // Within an octave there is only one.
     let powers = Some(axis.powers(2.0)).filter(|powers| powers.len() > 1);
     axis.ticks = powers.unwrap_or_default();
     let row = |(place, &&(cell, found)): (usize, &&(&ReportCell, Estimate))| {
@@ -79,15 +79,16 @@ fn ratio_name(ratio: f64) -> String {
     }
 }
 
-/// Time and visible items along the path, or the frames of a motion, and the
-/// distribution of times over it.
+/// Time and visible items along the path, and the distribution of times.
+///
+/// Or per frame of a motion.
 pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     let path = &comparison.about().path;
     let [view, query, course] = match path.motion.as_str() {
         "" => ["view", "query", "along the path"],
         _ => ["frame", "frame, update and queries,", "of the motion"],
     };
-    // Of a frame with several queries the first.
+    // In a frame with several queries, the first.
     let visible = views.visible.iter().step_by(path.views_per_frame.max(1));
     let visible: Vec<u64> = visible.copied().collect();
     let frame = |frame: f64| text::count(frame as usize);
@@ -98,7 +99,7 @@ pub fn along(comparison: &Comparison, views: &Views) -> Vec<Figure> {
     let timed = cells.filter_map(|cell| Some((cell, views.times.get(&cell.structure)?)));
     for (cell, readings) in timed {
         let readings: Vec<_> = readings.iter().filter(|r| is_drawn(r.ns)).collect();
-        // At the level of the table's time, which has an estimator of its own.
+        // Scaled to the time in the table, which has another estimator.
         let mean = readings.iter().map(|r| r.ns).sum::<f64>() / readings.len() as f64;
         let scale = cell.time().map_or(1.0, |time| time.value / mean);
         let point = |reading: &&Reading| Point {
@@ -205,12 +206,12 @@ pub fn errors(comparisons: &[&Comparison]) -> Option<Figure> {
 
 /// A structure, and its time and error at the level of a test.
 ///
-/// Large if it is on the front, a cross if it misses something that is to be found.
+/// Large if it is on the front, a cross if it misses a visible item.
 pub type Measured = (String, Point);
 
-/// Points of the front that are better the longer they take.
+/// Points of the front with the least error so far in order of time.
 ///
-/// The others are on it for their memory or for what they do not miss.
+/// The others are on it for their memory or for missing less.
 fn front(points: &[Measured]) -> Vec<[f64; 2]> {
     let mut least = f64::INFINITY;
     let points = points.iter().map(|own| &own.1);
@@ -239,13 +240,13 @@ fn levels(points: &[Measured]) -> Vec<(f64, String)> {
 
 /// Error against run time of points, the fastest first; `None` without any.
 ///
-/// No error at all is drawn in a gutter: a logarithmic axis has no zero.
+/// Zero error is drawn in a gutter: a logarithmic axis has no zero.
 pub fn against(caption: &str, mut points: Vec<Measured>) -> Option<Figure> {
     points.first()?;
     let all = points.len();
     let errors = points.iter().map(|(_, point)| point.at[1]);
     let least = errors.filter(|error| is_drawn(*error)).fold(1.0, f64::min);
-    // Half a power below the axis, which begins a power below the least error.
+    // Half a power of ten below the axis, which begins a power below the least error.
     let none = 10f64.powf(least.log10().floor() - 1.5);
     let gutter = none * 2.0;
     let placed = |error: f64| error.max(if error > 0.0 { gutter } else { none });
@@ -272,7 +273,7 @@ pub fn against(caption: &str, mut points: Vec<Measured>) -> Option<Figure> {
         true => "none".to_owned(),
         false => text::significant(error),
     };
-    // From nothing to a hundredth at least.
+    // From zero to at least a hundredth.
     let errors = places().flat_map(|p| p.ends.unwrap_or([p.at[1]; 2]));
     let mut y = Axis::log("", errors.chain([none, 1.0]), 1.5, &error);
     y.ticks = y.powers(10.0);

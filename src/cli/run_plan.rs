@@ -1,5 +1,6 @@
-//! The plan of `cullbench run`: scenes, paths, structures and culling tests,
-//! checked as far as possible before anything runs.
+//! The plan of `cullbench run`, checked as far as possible before the run.
+//!
+//! Scenes, paths, structures and culling tests.
 
 use std::fs;
 use std::path::Path;
@@ -18,22 +19,22 @@ use crate::report::{KeptPart, Stream};
 use crate::scene::{self, FETCHED, FETCHED_FOLDER, Fetched, every_part, split_part};
 use crate::suite::{REAL, REAL_PATHS, SUITES, Suite};
 
-/// A plan with where it comes from.
+/// A plan and its source.
 pub struct RunPlan {
     pub plan: Plan,
     /// Name of the suite or of its file; `None` for scenes and paths chosen by hand.
     pub suite: Option<String>,
     /// Structures as they were named.
     pub structures: String,
-    /// True if nothing in it is the user's own.
+    /// True if it has no files of the user.
     is_built_in: bool,
-    /// Scenes of the suite that cannot be measured here, and why.
+    /// Scenes of the suite that cannot be measured here, with the reason.
     pub left_out: Option<String>,
     /// Groups of the whole plan, if this is a shard.
     pub whole: Vec<GroupKey>,
 }
 
-/// The plan that arguments stand for; scenes and paths are not looked at yet.
+/// The plan of arguments; scenes and paths are not read yet.
 pub fn plan(registry: &Registry, args: &RunArgs) -> Result<RunPlan> {
     let mut planned = plan_of(registry, &args.what, &SUITES[0].name, None)?;
     if let Some(processes) = args.processes {
@@ -47,8 +48,9 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> Result<RunPlan> {
     Ok(planned)
 }
 
-/// The plan of the arguments that `run` and `compare --against` share, with the
-/// default suite, and default structures in place of the suite's.
+/// The plan of the arguments that `run` and `compare --against` share.
+///
+/// With the default suite, and default structures in place of the suite's.
 pub fn plan_of(
     registry: &Registry,
     args: &WhatArgs,
@@ -103,7 +105,7 @@ pub fn plan_of(
     })
 }
 
-/// Errors in the file of a suite name it.
+/// Errors in a suite's file name it.
 fn of_suite<T>(suite: Option<&String>, found: Result<T>) -> Result<T> {
     let file = suite.filter(|suite| suite.ends_with(".toml"));
     match file {
@@ -122,10 +124,11 @@ fn shard(text: &str) -> Result<(usize, usize)> {
 }
 
 impl RunPlan {
-    /// Reads every input: a mistake in the last file should not show after an
-    /// hour. A suite as it comes is known to be sound.
+    /// Reads every input: an error in the last file must not show after an hour.
+    ///
+    /// Built-in suites are known to be sound.
     pub fn check_inputs(&self) -> Result<()> {
-        // A file that is not there; of a suite's file the error names the suite.
+        // A missing file; for a suite's file the error names the suite.
         let scenes = self.plan.scenes.iter();
         let sources = scenes.flat_map(|scene| scene.paths.iter().chain([&scene.source]));
         for source in sources.chain(&self.plan.motions) {
@@ -141,8 +144,7 @@ impl RunPlan {
         of_suite(self.suite.as_ref(), self.check_scenes(&[]))
     }
 
-    /// Checks that the plan of a run that was begun is still the same, and so are its
-    /// files.
+    /// Checks that plan and files of a started run are unchanged.
     pub fn check_goes_on(&self, begun: &Stream) -> Result<()> {
         let structures = self.plan.structures.iter().map(|s| &s.label);
         if self.plan.groups() != begun.header.groups || !structures.eq(&begun.header.structures) {
@@ -154,7 +156,7 @@ impl RunPlan {
         self.check_scenes(&begun.parts)
     }
 
-    /// Loads every scene and every path of it, which are those of the parts `begun`.
+    /// Loads every scene and every path of it; they must match the parts `begun`.
     fn check_scenes(&self, begun: &[KeptPart]) -> Result<()> {
         let plain = Culling::default();
         let is_plain = |culling: &Culling| {
@@ -201,7 +203,7 @@ impl RunPlan {
     }
 }
 
-/// Refuses what a run was begun with if it is another now.
+/// Refuses to continue a run whose input has changed.
 pub fn same_digest(
     what: &str,
     name: &str,
@@ -220,7 +222,7 @@ pub fn same_digest(
     Ok(())
 }
 
-/// Scenes of the plan, and a line on those of the suite that it lacks.
+/// Scenes of the plan, and a line about omitted ones of the suite.
 fn scenes(args: &WhatArgs, suite: &Suite) -> Result<(Vec<PlannedScene>, Option<String>)> {
     let (mut scenes, mut left_out) = (suite.scenes.clone(), None);
     if !args.scene.is_empty() {

@@ -1,5 +1,7 @@
-//! The folder of a run: a new one, or an unfinished one to continue with the
-//! options and the plan it was begun with, on the same machine by the same program.
+//! The folder of a run: a new one, or an unfinished one to continue.
+//!
+//! An unfinished run continues with its original options and plan, on the same machine and with the
+//! same program.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -21,7 +23,7 @@ use crate::report::{
 };
 use crate::scene;
 
-/// Makes the folder of a new run.
+/// Creates the folder of a new run.
 pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFolder, Stream)> {
     let clock = SystemTime::now();
     let now = utc(clock);
@@ -48,21 +50,21 @@ pub fn create(args: &RunArgs, plan: &RunPlan, machine: Machine) -> Result<(RunFo
     Ok((folder, Stream::of(header)))
 }
 
-/// The words of a command, to be typed again.
+/// The words of a command, quoted to be typed again.
 pub fn command_line(typed: &[String]) -> String {
     let words = typed.iter().map(|word| text::quoted(word));
     let words = [program::name().to_owned()].into_iter().chain(words);
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// The arguments behind the program's name, to be read again by a worker.
+/// The arguments after the program's name, for a worker to read again.
 pub fn typed_args() -> Result<Vec<String>> {
     let typed = std::env::args_os().skip(1).map(OsString::into_string);
     let typed: Result<_, _> = typed.collect();
     typed.map_err(|bad| anyhow::anyhow!("argument {bad:?} is no UTF-8; expected text"))
 }
 
-/// SHA-256 of the program that runs; `None` if it cannot be read.
+/// SHA-256 of the running program; `None` if it cannot be read.
 fn binary_digest() -> Option<String> {
     digest(&std::env::current_exe().ok()?)
 }
@@ -79,7 +81,7 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
     let (folder, stream) = StoppedRun::open(&path)?;
     let place = || path.display().to_string();
     let begun = same_options(&stream.header.args).with_context(place)?;
-    // Times of another machine or program do not belong into one report.
+    // Times of another machine or program do not belong in one report.
     let kernel = begun.what.culling.kernel.execution().with_context(place)?;
     let here = Header {
         schema_version: SCHEMA_VERSION,
@@ -94,7 +96,7 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
         return Err(anyhow::Error::msg(why).context(place()));
     }
     let suite = begun.what.suite.as_deref().unwrap_or_default();
-    // One that is missing is the error of who reads it.
+    // A missing file is reported by its reader.
     let before = stream.header.files.get(suite).cloned();
     if let Some(now) = digest(Path::new(suite)) {
         same_digest("suite", suite, before, || now.clone()).with_context(place)?;
@@ -105,7 +107,7 @@ pub fn resume(args: &RunArgs) -> Result<(StoppedRun, Stream, RunArgs)> {
 /// Options that do not change the measurement.
 const NOT_OF_THE_PLAN: [&str; 6] = ["resume", "out", "timeout", "save", "all_columns", "why"];
 
-/// The recorded options, if those typed now say nothing else.
+/// The recorded options, unless those typed now contradict them.
 fn same_options(recorded: &[String]) -> Result<RunArgs> {
     let before = TypedOptions::recorded(recorded)?;
     let now = TypedOptions::of("run", "run", std::env::args_os())?;
@@ -118,7 +120,7 @@ fn same_options(recorded: &[String]) -> Result<RunArgs> {
             before.told(id)
         );
     }
-    // What was typed now and is no part of the plan takes the place of what is recorded.
+    // Options typed now that are not part of the plan replace recorded ones.
     let is_new = |name: &str| !now.words(|typed| typed == name).is_empty();
     let mut line = [program::name(), "run"].map(str::to_owned).to_vec();
     line.extend(before.words(|name| !is_new(name)));
@@ -130,11 +132,10 @@ fn same_options(recorded: &[String]) -> Result<RunArgs> {
     }
 }
 
-/// Message where there is no run.
+/// Message if there is no run.
 const NO_RUN: &str = "no run was recorded there; expected the folder of a run";
 
-/// Checks that two runs were begun with the same options, apart from folder and
-/// shard.
+/// Checks that two runs have the same options, except folder and shard.
 pub fn same_recorded(one: &[String], other: &[String]) -> Result<()> {
     let (one, other) = (TypedOptions::recorded(one)?, TypedOptions::recorded(other)?);
     for (id, name, _) in one.all() {
@@ -148,26 +149,26 @@ pub fn same_recorded(one: &[String], other: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// An error of recorded options, which are no usage of this command.
+/// An error of recorded options, which is not a usage error of this command.
 fn one_line(error: clap::Error) -> anyhow::Error {
     let line = program::one_line(&error).map(|line| format!("recorded options: {line}"));
     anyhow::Error::msg(line.unwrap_or_else(|| NO_RUN.to_owned()))
 }
 
-/// The options of a command, as they were typed behind it or another.
+/// The options of a command, as typed after it or after another command.
 pub struct TypedOptions {
     matches: ArgMatches,
     owner: clap::Command,
 }
 
 impl TypedOptions {
-    /// The options of a run that was begun.
+    /// The options of a started run.
     pub fn recorded(args: &[String]) -> Result<TypedOptions> {
         let line = [&[program::name().to_owned()][..], args].concat();
         TypedOptions::of("run", "run", line)
     }
 
-    /// Those of `owner` in a line of `command`.
+    /// The options of `owner` in a line of `command`.
     pub fn of(
         command: &str,
         owner: &str,
@@ -202,7 +203,7 @@ impl TypedOptions {
         })
     }
 
-    /// The typed options as words, `--up=y`; those of which `is_wanted` takes the name.
+    /// The typed options as words, `--up=y`, whose names `is_wanted` accepts.
     pub fn words(&self, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
         let typed = self.typed().filter(|(_, name, _)| is_wanted(name));
         let words = typed.flat_map(|(id, name, has_value)| match has_value {
@@ -227,9 +228,9 @@ impl TypedOptions {
     }
 }
 
-/// The folder in results that holds the newest of the runs that `of` reads.
+/// The folder in results with the newest of the runs that `of` reads.
 pub fn newest_run(of: impl Fn(&Path) -> Option<RunInfo>) -> Option<PathBuf> {
-    // No folder of results holds no run.
+    // Without a folder of results there are no runs.
     let listing = fs::read_dir("results").into_iter().flatten().flatten();
     let runs = listing.filter_map(|entry| {
         let run = of(&entry.path())?;
@@ -241,7 +242,7 @@ pub fn newest_run(of: impl Fn(&Path) -> Option<RunInfo>) -> Option<PathBuf> {
 
 fn newest_unfinished() -> Result<PathBuf> {
     let found = newest_run(|path| {
-        // Killed at the very end, a run lacks nothing but its report.
+        // A run killed at the very end lacks only its report.
         let report = read_report(&path.join("report.json"));
         let is_finished = report.is_ok_and(|report| report.run.finished_at.is_some());
         let stream = (!is_finished).then(|| read_stream(&path.join("stream.jsonl")));

@@ -1,8 +1,8 @@
 //! Tables of the results of a run.
 //!
-//! One scene and path is a row per structure, several are a row each. The terminal shows a
-//! summary of them, documents all. Names of cells: in a sentence, in a column of a table,
-//! and in few characters.
+//! A single scene and path has a row per structure, several have a row each. The terminal shows a
+//! summary of them, documents all. Names of cells: for a sentence, for a column of a table, and
+//! short.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ use crate::statistics::Estimate;
 
 /// Comparisons of one cache state and culling test each.
 ///
-/// With the settings that tell groups apart, "cold, six-box"; nothing of a single one.
+/// With the settings that distinguish the groups, "cold, six-box"; empty for a single one.
 pub fn groups<'a, 'r>(all: &'a [Comparison<'r>]) -> Vec<(String, Vec<&'a Comparison<'r>>)> {
     let groups = grouped(all.iter().map(|comparison| (key(comparison), comparison)));
     let differs = |n: &usize| groups.iter().any(|(key, _)| key[*n] != groups[0].0[*n]);
@@ -34,7 +34,7 @@ fn key<'r>(comparison: &Comparison<'r>) -> [&'r str; 3] {
     [&about.path.cache, &about.test, about.ranked_by()]
 }
 
-/// Lines above a table: the scene, the queries, and what they return.
+/// Lines above a table: the scene, the queries, and their answers.
 pub fn heads(comparison: &Comparison) -> Vec<String> {
     let cell = comparison.about();
     let (scene, path) = (&cell.scene, &cell.path);
@@ -55,16 +55,16 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         let checked = comparison.timed(|cell| cell.times.cameras_checked).max();
         let frames = checked.unwrap_or(0) / (queries + 1);
         let queries = text::counted(queries + 1, "query");
-        // Cells without times say nothing of frames.
+        // Cells without times do not state frames.
         match text::counted(frames, "frame") {
             _ if frames == 0 => format!("{}: {queries} per frame", path.motion),
             frames => format!("{}: {frames}, {queries} each", path.motion),
         }
     });
-    // Sets of a coarse test are larger than what is visible.
+    // Sets of a coarse test are larger than the visible set.
     let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
     let culled = comparison.of_any("cull_rate");
-    // All may be false positives: there is no share of the visible ones.
+    // All may be false positives: then there is no share of visible ones.
     let judged = comparison.judged();
     let none = judged.filter(|j| j.errors.visible == 0 && j.errors.false_positives > 0);
     let none = none.map(|judged| text::counted(judged.judged_queries, "checked view"));
@@ -78,7 +78,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
             _ => format!("{returned} visible"),
         }
     });
-    // Nothing if all are the culling test's own.
+    // Empty if all are the culling test's own.
     let errors = judged.map(|judged| judged.errors);
     let errors = errors.filter(|errors| errors.by_storage > 0 || errors.by_planes > 0);
     let sources = errors.map(|errors| text::sources(errors) + " by storage/planes/test");
@@ -107,7 +107,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
     lines.into_iter().filter(|line| !line.is_empty()).collect()
 }
 
-/// A column of single figures: head and metric.
+/// A column of a single figure: header and metric.
 pub type Figure = (&'static str, &'static str);
 
 /// Figures of queries by priority; a summary has the first two.
@@ -138,7 +138,7 @@ pub const OF_FRAMES: [Figure; 8] = [
     ("x after 1000", "ageing_1000"),
 ];
 
-/// A figure by its unit; a time in full has its interval.
+/// A figure in its unit; a time in full has its interval.
 fn figure(metric: &Metric, is_full: bool) -> String {
     match metric.unit.as_str() {
         "ns" | "ms" if is_full => text::time_with(metric),
@@ -151,8 +151,8 @@ fn figure(metric: &Metric, is_full: bool) -> String {
 
 /// A row per structure of one scene and path.
 ///
-/// In full with intervals, lower bounds and every figure; else what a wide terminal has
-/// room for.
+/// In full with intervals, lower bounds and every figure; else the columns that fit a wide
+/// terminal.
 pub fn structures(comparison: &Comparison, base: Option<&str>, is_full: bool) -> Table {
     let is_still = comparison.about().path.motion.is_empty();
     let time = ["time per frame", "time per query"][usize::from(is_still)];
@@ -206,8 +206,8 @@ fn ratio(found: Estimate, is_full: bool) -> String {
 
 /// Speed-ups over the base, and their geometric means.
 ///
-/// A row per scene and path, a column per structure. The base has its times; `*` marks
-/// the fastest and its ties.
+/// A row per scene and path, a column per structure. The base has its times; `*` marks the fastest
+/// and its ties.
 pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Table {
     let is_base = |name: &str| overall.base == Some(name);
     let mut columns: Vec<_> = overall.standings.iter().collect();
@@ -247,9 +247,9 @@ pub fn matrix(names: Vec<String>, all: &[&Comparison], overall: &Overall) -> Tab
 pub fn of_many(all: &[&Comparison], overall: &Overall, width: usize) -> Vec<Block> {
     let about = || all.iter().map(|comparison| comparison.about());
     let up: BTreeSet<&str> = about().map(|cell| cell.scene.up.as_str()).collect();
-    // Unknown of a scene that did not load.
+    // Unknown for a scene that did not load.
     let up: Vec<&str> = up.into_iter().filter(|up| !up.is_empty()).collect();
-    // One value where it is the same in all.
+    // A single value if it is the same in all.
     let lens = about().filter_map(|cell| cell.path.lens.clone());
     let lens = lens.reduce(CameraFacts::with);
     let lens = lens.as_ref().map(scene_facts::lens);
@@ -285,7 +285,7 @@ pub fn legend(all: &[&Comparison], overall: &Overall) -> String {
 
 /// Short names of scenes and paths: "city 100k flythrough 2 %".
 ///
-/// Two that would be the same are cut where they differ.
+/// Two that would be equal are shortened around their difference.
 pub fn labels(all: &[&Comparison]) -> Vec<String> {
     let keys: Vec<GroupKey> = all.iter().map(|c| c.about().key().group).collect();
     labels_of(&keys)
@@ -329,7 +329,7 @@ fn about_difference(name: &str, all: &[String]) -> String {
     text::shortened(&name, ROOM / 4) + &text::without_middle(&rest, [ROOM / 2, ROOM / 4])
 }
 
-/// Short names; the full ones where two that differ have the same.
+/// Short names; full ones if two different ones have the same.
 pub fn distinct<T: PartialEq>(
     all: &[T],
     short: impl Fn(&T) -> String,
@@ -409,14 +409,14 @@ pub fn name(cell: &CellKey) -> String {
     format!("{structure} on {scene}, {}", question(&cell.group))
 }
 
-/// Structure in at most twenty characters; its last parameter stays.
+/// Structure in at most twenty characters; its last parameter is kept.
 pub fn short_structure(name: &str) -> String {
     text::without_middle(&text::plain(name), [8, 9])
 }
 
-/// Scene and path in short, with the test and the cache state that are no defaults.
+/// Scene and path in short, with test and cache state unless default.
 ///
-/// At most `room` characters; the scene is cut first.
+/// At most `room` characters; the scene is shortened first.
 pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String {
     let other = |text: &String, usual: &str| (text != usual).then(|| text.clone());
     let test = other(&group.test, CullingTest::SixPlane.name());
@@ -434,7 +434,7 @@ pub fn place(group: &GroupKey, room: usize, short: fn(&str) -> String) -> String
     text::shortened(&(text::shortened(&scene, left) + &rest), most)
 }
 
-/// All of a key that is no default, but for the scene.
+/// All settings of a key that are not defaults, except the scene.
 pub fn question(group: &GroupKey) -> String {
     let cold = Some(&group.cache).filter(|cache| *cache != "warm");
     let test = group.test.clone() + &text::some(cold, |cache| format!(" ({cache})"));
@@ -442,10 +442,10 @@ pub fn question(group: &GroupKey) -> String {
     text::joined(asked.into_iter().chain(unusual(group)))
 }
 
-/// Arithmetic, plane derivation and epsilon, where they are no defaults.
+/// Arithmetic, plane derivation and epsilon, unless default.
 pub fn unusual(group: &GroupKey) -> impl Iterator<Item = String> {
     let usual = GroupKey::of("", "", false, &Culling::default(), "");
-    // There is none in f64.
+    // f64 has no epsilon.
     let epsilon = |key: &GroupKey| match key.arithmetic.as_str() {
         "f64" => format!("epsilon {}", usual.epsilon),
         _ => format!("epsilon {}", key.epsilon),

@@ -1,7 +1,7 @@
 //! Conclusions of a run in sentences.
 //!
-//! The winner, its lead over the next best and over the base, the queries that repay its
-//! build, and how its answers were checked.
+//! The winner, its lead over the next best and over the base, the queries that repay its build, and
+//! the checks of its answers.
 
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,7 +44,7 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
         _ => (standing(all, overall), overall.standings.len() < 2),
     };
     let mut told = vec![first];
-    // Where it is not the usual one.
+    // If it is not the usual one.
     if let Some(other) = base.filter(|base| *base != YARDSTICK && !is_alone) {
         told.push(format!(
             "Speed-ups refer to {other}, the slowest: {YARDSTICK} lacks times."
@@ -59,9 +59,9 @@ pub fn conclusion(all: &[&Comparison], overall: &Overall) -> String {
     told.join(" ")
 }
 
-/// The oldest structures where queries take over twice a fresh build's time.
+/// The oldest trees whose queries take over twice a fresh build's time.
 ///
-/// Each by its worst scene, path and motion; of the others the tree that ages least.
+/// Each with its worst scene, path and motion; of the others the tree that ages least.
 fn ageing(all: &[&Comparison]) -> Option<String> {
     let (longest, mut aged) = ["1000", "100", "10"].into_iter().find_map(|frames| {
         let trees = all.iter().flat_map(|c| c.sound());
@@ -85,7 +85,7 @@ fn ageing(all: &[&Comparison]) -> Option<String> {
     (!old.is_empty()).then(|| format!("{told} on a fresh build{kept}."))
 }
 
-/// Remarks on rebuilds that do not come, and on dropped contacts.
+/// Remarks about missing rebuilds, and about dropped contacts.
 fn caveats(all: &[&Comparison]) -> Vec<String> {
     let late = all.iter().flat_map(|c| &c.cells).filter_map(|cell| {
         let (_, every) = cell.structure.split_once("@every=")?;
@@ -106,9 +106,9 @@ fn caveats(all: &[&Comparison]) -> Vec<String> {
     told
 }
 
-/// Wall and CPU time of work that at most `threads` share, and what it gains.
+/// Wall and CPU time of work that at most `threads` share, and its gain.
 ///
-/// `None` where no work is shared.
+/// `None` if no work is shared.
 pub fn sharing<'c>(
     cells: impl IntoIterator<Item = &'c ReportCell>,
     threads: usize,
@@ -159,10 +159,10 @@ fn on_one_thread(label: &str) -> Option<String> {
     Some(before.strip_suffix([':', ','])?.to_owned() + after)
 }
 
-/// Wall times nearer than this are the layout of memory.
+/// Least ratio of wall times that counts; smaller ones are due to memory layout.
 const LEAST_GAIN: f64 = 1.05;
 
-/// Conclusion where no camera sees an item.
+/// Conclusion if no camera sees an item.
 pub const BLIND: &str = "Nothing is to be taken: no camera sees an item (see the warnings).";
 
 fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
@@ -180,7 +180,7 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
         return BLIND.to_owned();
     }
     let next = comparison.sound().nth(winners.len());
-    // Noise alone may tie the fastest with what is slower than the next best.
+    // Noise alone may tie the fastest with one slower than the next best.
     let is_ahead =
         |cell: &&&ReportCell| next.and_then(|next| times_as_fast(next, cell)) >= next.map(|_| 1.0);
     let ahead = winners.iter().filter(is_ahead);
@@ -219,9 +219,9 @@ fn ranking(comparison: &Comparison, base: Option<&str>) -> String {
     format!("Take {said}{of_base}.")
 }
 
-/// The queries after which the build of the fastest has paid.
+/// Number of queries after which the build of the fastest has paid off.
 ///
-/// `None` where the base is not proven slower.
+/// `None` if the base is not proven slower.
 fn repaid(comparison: &Comparison, base: Option<&str>) -> Option<String> {
     let best = comparison.winners().next()?;
     let mut winners = comparison.winners();

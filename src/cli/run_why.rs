@@ -15,7 +15,7 @@ const COUNTERS: [(&str, &str); 4] = [
     ("items_accepted_untested", "items returned untested"),
 ];
 
-/// A structure, and beside it the best of the others.
+/// A structure and the best of the others.
 struct Pair<'r> {
     own: &'r ReportCell,
     other: &'r ReportCell,
@@ -47,7 +47,7 @@ pub fn is_named(label: &str, name: &str) -> bool {
     label == name || label.split([':', '@']).next() == Some(name)
 }
 
-/// The structure with that label, or without parameters that name.
+/// The structure with that label, or with that name without parameters.
 fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, String> {
     let cells = || comparison.cells.iter().copied();
     let labelled = cells().find(|cell| cell.structure == structure);
@@ -70,7 +70,7 @@ fn pair<'r>(comparison: &Comparison<'r>, structure: &str) -> Result<Pair<'r>, St
 }
 
 impl Pair<'_> {
-    /// Quotient of own and other.
+    /// Ratio of own and other value.
     fn ratio(&self, of: impl Fn(&ReportCell) -> Option<f64>) -> Option<f64> {
         let ratio = of(self.own)? / of(self.other)?;
         ratio.is_finite().then_some(ratio)
@@ -101,7 +101,7 @@ fn update_ns(cell: &ReportCell) -> Option<f64> {
     cell.value("frame_ns").and_then(|_| cell.value("update_ns"))
 }
 
-/// Time per query; of frames with several views the mean of all, as counters are.
+/// Time per query; for frames with several views the mean of all, like counters.
 fn query_ns(cell: &ReportCell) -> Option<f64> {
     let first = cell.value("query_ns")?;
     let further = cell.path.views_per_frame.saturating_sub(1) as f64;

@@ -1,6 +1,7 @@
-//! `cullbench scene`: looking at scenes, and writing generated ones and those
-//! of other formats as boxes; `scene draw`: a scene from above and the cells of a
-//! structure, with a camera in the colours of a query's verdicts.
+//! `cullbench scene`: facts about scenes, conversion to boxes, and drawings.
+//!
+//! Generated scenes and those of other formats are written as boxes. `scene draw` shows a scene
+//! from above and the cells of a structure, with a camera in the colours of a query's verdicts.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -31,7 +32,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let load = |path: &String| path::load(path, &scene, &defaults);
     let path = args.path.as_ref().map(load);
     let path = path.transpose()?.unwrap_or_default();
-    // Of the default culling test; other numbers may hold one.
+    // With the default culling test; another arithmetic may hold it.
     let refused = Workload::new(&scene, &path, &Culling::default()).err();
     refused.iter().for_each(|error| warn(&error.to_string()));
     let cameras = path.cameras;
@@ -110,7 +111,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let counts = labels.histogram();
         let one = |(label, count): &(&str, usize)| {
             let label = if label.is_empty() { "(none)" } else { label };
-            // Beside a count and commas.
+            // Next to a count and commas.
             let quote = ["", "'"][usize::from(label.contains([',', ' ']))];
             format!("{quote}{label}{quote} {}", text::count(*count))
         };
@@ -163,7 +164,7 @@ pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     write(kept, out)
 }
 
-/// The file to write, which is not the input; none for standard output.
+/// The file to write, which must not be the input; `None` for standard output.
 fn expect_other<'f>(out: Option<&'f Path>, scene: &str) -> anyhow::Result<Option<&'f Path>> {
     let out = out.filter(|out| *out != Path::new("-"));
     expect_places(&[("--out", &out.map(Path::to_owned))], &[scene])?;
@@ -207,7 +208,7 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
-/// Output that fails after an interrupt; the half-written file is then removed.
+/// Output that fails after an interrupt; the partial file is then removed.
 struct UntilInterrupted<W>(W);
 
 impl<W: Write> Write for UntilInterrupted<W> {
@@ -232,7 +233,7 @@ const SEEN: &[Class] = rows! { Class { colour, words, is_key }
     "#009e73", "visible", true;
 };
 
-/// Items by what the query of a structure did with them.
+/// Items by their treatment in a structure's query.
 const VERDICTS: &[Class] = rows! { Class { colour, words, is_key }
     "#c8cdd2", "outside, rejected with their cell", false;
     "#cc79a7", "outside, tested one by one", false;
@@ -290,7 +291,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     let cells = index.as_ref().map_or(Vec::new(), |index| index.cells());
     let verdicts = view.as_ref().map(|view| verdicts(&cells, view.as_any()));
     let (classes, class_of) = match (&view, &index, &verdicts) {
-        // By what the query of the structure did with each item.
+        // By the treatment of each item in the structure's query.
         (Some(view), Some(index), Some(verdicts)) => {
             let (mut class_of, mut visible) = (vec![REJECTED; scene.items.len()], Vec::new());
             index.query(view.as_any(), &mut visible);
@@ -345,7 +346,7 @@ pub fn draw(registry: &Registry, args: &SceneDrawArgs) -> anyhow::Result<Ending>
     Ok(Ending::Ok)
 }
 
-/// A structure that has cells.
+/// A structure with cells.
 fn divided(registry: &Registry, text: &str) -> anyhow::Result<StructureSpec> {
     let spec = registry.structure(text)?;
     // More boxes than the largest block holds.
@@ -373,7 +374,7 @@ mod tests {
     use crate::query::{AnyVolume, ItemId, QueryCost};
     use crate::scene;
 
-    /// Costs of a query as the cells show it.
+    /// Costs of a query according to the cells.
     ///
     /// Nodes tested and rejected, items tested and accepted untested.
     fn shown(cells: &[TreeCell<'_>], volume: AnyVolume<'_>) -> [usize; 4] {

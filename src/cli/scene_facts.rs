@@ -1,6 +1,6 @@
 //! Figures of a scene's boxes: sizes, flatness, overlap, copies, loss by f32.
 //!
-//! Lenses, matrices and axes in words, which tables and pages show as well.
+//! Also lenses, matrices and axes in words, for tables and pages.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -12,17 +12,17 @@ use crate::path::{CameraFacts, LensDefaults, MatrixFacts, scattered};
 use crate::scene::{Scene, WorldBox};
 use crate::statistics::{quantile, sorted};
 
-/// Edge of a flat item along its thinnest axis, as a share of its longest edge.
+/// Most thickness of a flat item / its longest edge.
 const FLAT: f64 = 0.01;
 /// Most items whose neighbours are counted.
 const SAMPLE: usize = 1000;
-/// Neighbours after which no other item is sampled.
+/// Number of neighbours after which no further item is sampled.
 const MOST_NEIGHBOURS: usize = 10_000_000;
 /// Steps of the histogram of sizes.
 const STEPS: usize = 12;
 const BARS: [char; 9] = ['·', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// Figures of the items as they were written.
+/// Figures of the items as written.
 ///
 /// Sizes are longest edges in units of the scene.
 #[derive(Serialize)]
@@ -36,22 +36,22 @@ pub struct SceneFacts {
     size_median: Option<f64>,
     size_p99: Option<f64>,
     size_max: Option<f64>,
-    /// Steps of equal ratio from the smallest size above zero to the largest.
+    /// Steps of equal ratio from the smallest positive size to the largest.
     size_histogram: Vec<SizeStep>,
     /// Items whose longest edge is zero.
     point_count: usize,
     /// Items that are flat along x, y and z, points excluded.
     flat_counts: [usize; 3],
-    /// Items with the bounds of an item before them.
+    /// Items with the bounds of an earlier item.
     coincident_count: usize,
-    /// Mean number of other items that an item meets, of a sample.
+    /// Mean number of other items that an item meets, in a sample.
     overlap_mean: Option<f64>,
-    /// Share of items that meet another one, of the sample.
+    /// Share of items that meet another one, in the sample.
     overlap_share: Option<f64>,
     overlap_sample_count: usize,
     /// Farthest that f32 moves a bound outward, per axis.
     f32_loss: [f64; 3],
-    /// Distance of f32 numbers at the farthest bound in world coordinates, per axis.
+    /// Spacing of f32 numbers at the farthest bound in world coordinates, per axis.
     f32_step_unmoved: [f64; 3],
 }
 
@@ -68,7 +68,7 @@ impl SceneFacts {
         let edges = sorted(extents().map(|extent| extent.max_element()).collect());
         let [size_min, size_median, size_p99, size_max] =
             [0.0, 0.5, 0.99, 1.0].map(|q| quantile(&edges, q));
-        // A point is not thinner than it is long.
+        // A point is not flat.
         let flat_counts = [0, 1, 2].map(|axis| {
             let is_flat = |extent: &DVec3| extent[axis] < FLAT * extent.max_element();
             extents().filter(is_flat).count()
@@ -102,7 +102,7 @@ impl SceneFacts {
             let (mut met, b) = (0, scene.written_box(item));
             let stored = &scene.items[item];
             tree.each_visible(stored, |id| met += usize::from(scene.overlaps(id, &b)));
-            // One that ends the sample is no part of it: such an item is no random one.
+            // An item that ends the sample is not part of it, since it is not a random one.
             if sampled > 0 && others + met > MOST_NEIGHBOURS {
                 break;
             }
@@ -131,7 +131,7 @@ impl SceneFacts {
         })
     }
 
-    /// The figures for people, a name and a text each.
+    /// The figures as names and texts.
     pub fn rows(&self, scene: &Scene) -> Vec<(&'static str, String)> {
         let length = |value: f64| length(value, scene.unit);
         let count = scene.items.len();
@@ -165,7 +165,7 @@ impl SceneFacts {
         let (all, others) = (text::percent(share), text::short(mean));
         let mut overlap = format!("{all} meet other items, {others} on average");
         if sampled < count {
-            // As many digits as items of the sample that meet others decide.
+            // As many digits as the number of sampled items that meet others supports.
             let digits = usize::from(share * sampled as f64 >= 100.0);
             let [all, others] = [share * 100.0, mean].map(|x| text::short(rounded(x, digits)));
             let of = format!("(of {} sampled)", people(sampled));
@@ -205,14 +205,14 @@ impl SceneFacts {
     }
 }
 
-/// Counts per step of equal ratio; empty where all sizes are one.
+/// Counts per step of equal ratio; empty if all sizes are equal.
 fn histogram(edges: &[f64]) -> Vec<SizeStep> {
     let above_zero = &edges[edges.partition_point(|edge| *edge <= 0.0)..];
     let (least, most) = match *above_zero {
         [least, .., most] if least < most => (least, most),
         _ => return Vec::new(),
     };
-    // By logarithms, whose difference f64 always holds.
+    // By logarithms, whose difference f64 can always represent.
     let [low, high] = [least, most].map(libm::log);
     let between = |share: f64| low + (high - low) * share;
     let end = |step: usize| match step {
@@ -220,7 +220,7 @@ fn histogram(edges: &[f64]) -> Vec<SizeStep> {
         STEPS => most,
         _ => libm::exp(between(step as f64 / STEPS as f64)),
     };
-    // Each step has its lower end, the last one both.
+    // Each step includes its lower end, the last one both.
     let below = |step: usize| match step {
         STEPS => above_zero.len(),
         _ => above_zero.partition_point(|edge| *edge < end(step)),
@@ -233,7 +233,7 @@ fn histogram(edges: &[f64]) -> Vec<SizeStep> {
     (0..STEPS).map(step).collect()
 }
 
-/// A count for people: 11,065 or 1.2 million.
+/// A readable count: 11,065 or 1.2 million.
 pub fn people(count: usize) -> String {
     match count {
         0..1_000_000 => text::count(count),
@@ -241,7 +241,7 @@ pub fn people(count: usize) -> String {
     }
 }
 
-/// A length for people: 3.4 km, 12 m, 5 mm, 64 map units, or 64 without a unit.
+/// A readable length: 3.4 km, 12 m, 5 mm, 64 map units, or 64 without a unit.
 fn length(value: f64, unit: Option<&str>) -> String {
     let (scale, unit) = match unit {
         None if value > 0.0 && value < 1e-3 => return format!("{value:.2e}"),
@@ -316,7 +316,7 @@ fn shown([least, most]: [f64; 2]) -> String {
     if a == b { a } else { format!("{a} to {b}") }
 }
 
-/// Four digits, no more zeros than needed.
+/// Four digits without trailing zeros.
 fn figure(value: f64) -> String {
     // No lens has 180 degrees.
     let digits = [3, 6][usize::from((179.9..180.0).contains(&value))];
@@ -426,7 +426,7 @@ mod tests {
         }
     }
 
-    /// Every other item meets another one, or the first quarter lies in one pile.
+    /// Every other item meets another one, or the first quarter is in one pile.
     #[test]
     fn neighbours_are_counted_of_items_from_anywhere() {
         let alone = |item: usize| [1e6 + 9.0 * item as f64, 1.0];

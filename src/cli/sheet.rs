@@ -15,7 +15,7 @@ pub type Rect = [DVec2; 2];
 
 /// Longer side of the drawing in pixels.
 pub const SIDE: f64 = 800.0;
-/// Room for the labels of the axes, and for the caption.
+/// Margins for the labels of the axes, and for the caption.
 const LEFT: f64 = 84.0;
 const TOP: f64 = 36.0;
 const LINE: f64 = 20.0;
@@ -70,8 +70,7 @@ impl Sheet {
         [(p.x - low.x) * self.scale, (high.y - p.y) * self.scale].map(px)
     }
 
-    /// Adds a rectangle to a path, at least one pixel wide and high, cut off beyond the
-    /// sheet.
+    /// Adds a rectangle to a path, at least one pixel in size, clipped to the sheet.
     pub fn push_rect(&self, [low, high]: Rect, path: &mut String) {
         let [first, last] = self.window;
         let sides = [
@@ -171,7 +170,7 @@ pub fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
 pub struct Class {
     pub colour: &'static str,
     pub words: &'static str,
-    /// Items that are drawn however far from the eye; cells that are filled.
+    /// True for items drawn at any distance from the eye, and for filled cells.
     pub is_key: bool,
 }
 
@@ -256,7 +255,7 @@ impl Cells<'_> {
         }
     }
 
-    /// Cells and planes that are not drawn; empty where there are none.
+    /// Notes about cells and planes that are not drawn; empty without any.
     pub fn notes(&self, up: UpAxis) -> [String; 3] {
         let (drawn, below): (Vec<&TreeCell<'_>>, Vec<_>) =
             (self.cells.iter()).partition(|cell| cell.level <= self.depth);
@@ -288,7 +287,7 @@ pub fn corners_of([a, b]: Rect) -> [DVec2; 4] {
 
 /// The part of a polygon in a half-space about an origin.
 ///
-/// All of it if the plane is not upright.
+/// The whole polygon if the plane is not upright.
 pub fn cut(polygon: &[DVec2], side: &Plane, origin: DVec3) -> Vec<DVec2> {
     if !is_upright(side) {
         return polygon.to_vec();

@@ -1,6 +1,7 @@
-//! `cullbench stress`: the test vectors and the generated extremes on every
-//! structure. Prints what passed in a line per category and each kind of failure
-//! with who fails so, or all rows as JSON.
+//! `cullbench stress`: test vectors and generated extremes on every structure.
+//!
+//! Prints a line per category with what passed, and each kind of failure with the structures that
+//! fail, or all rows as JSON.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -118,16 +119,16 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(is_right))
 }
 
-/// Failures that the table shows, each with all that fail alike.
+/// Most failures in the table, each with all structures that fail alike.
 const MOST_SHOWN: usize = 100;
 
-/// Cases of each extreme by another instruction set than the chosen one.
+/// Cases of each extreme per instruction set other than the chosen one.
 const OF_OTHERS: u64 = 2;
 
-/// The failures by another instruction set, which they name.
+/// The failures with another instruction set, which they name.
 fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
     for section in &mut sections {
-        // The oracle has no instruction set.
+        // The oracle does not use instruction sets.
         let differs = |row: &Row| row.status == Status::Fail && row.structure != ORACLE;
         section.rows.retain(differs);
         for row in &mut section.rows {
@@ -153,7 +154,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let width = text::width();
     let mut told = vec![Table::with(sections, columns).fitted(width)];
     let rows = || sections.iter().flat_map(|section| &section.rows);
-    // Alike but for structure, test and instruction set.
+    // Equal except for structure, test and instruction set.
     let mut alike = BTreeMap::<_, Vec<String>>::new();
     for row in rows().filter(|row| row.status == Status::Fail) {
         let by = text::some(row.kernel, |kernel| format!(" by {kernel}"));

@@ -1,6 +1,6 @@
-//! Commands that take their times in processes of their own (`advise`, `drift`,
-//! `funnel`, `precision`): their inputs, their progress bar, and how the times of all
-//! processes come together.
+//! Commands that time in processes: `advise`, `drift`, `funnel`, `precision`.
+//!
+//! Their inputs, their progress bar, and the collection of times from all processes.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::measure::{Machine, NO_ITEMS, ProcessTimes, Setting, Status};
 use crate::path;
 use crate::scene::{self, Scene, split_part};
 
-/// Rounds of what is timed, at least and at most, if one process has them all.
+/// Fewest and most rounds of a task if a single process does them all.
 pub const ROUNDS: [usize; 2] = [5, 15];
 
 /// A progress bar of `parts` parts, with a word for them.
@@ -30,8 +30,8 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{wide_msg}}");
     let style = ProgressStyle::with_template(&template);
     let left = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
-        // Parts differ too much for the speed of the last seconds. Before the first part is
-        // done nothing is known.
+        // Parts differ too much for the speed of the last seconds. Before the first part is done
+        // nothing is known.
         let undone = state.len().unwrap_or(0).saturating_sub(state.pos());
         if state.pos() > 0 {
             let left = state.elapsed().mul_f64(undone as f64 / state.pos() as f64);
@@ -44,7 +44,7 @@ pub fn progress(parts: u64, word: &str) -> ProgressBar {
     bar
 }
 
-/// Tells where no bar is drawn how much of the `parts` is done: a line a minute.
+/// Reports progress in `parts` if no bar is drawn: a line per minute.
 pub fn tell_progress(bar: &ProgressBar, parts: &str, told: &mut Instant) {
     if bar.is_hidden() && told.elapsed() >= Duration::from_secs(60) {
         *told = Instant::now();
@@ -55,10 +55,10 @@ pub fn tell_progress(bar: &ProgressBar, parts: &str, told: &mut Instant) {
     }
 }
 
-/// Loads what the arguments name, in a worker for its `timing`.
+/// Loads the inputs that the arguments name; with `timing`, in a worker.
 ///
-/// The command itself has room for structures, `each` of those named and some `more`, and
-/// for bytes per triangle.
+/// The command itself checks memory for structures, `each` per named one and some `more`, and for
+/// bytes per triangle.
 pub fn load(
     registry: &Registry,
     args: &StudyArgs,
@@ -91,7 +91,7 @@ pub fn load(
     })
 }
 
-/// Tells readers of tables that boxes of a file are taken as what is drawn.
+/// Notes for readers of tables that boxes of a file are taken as solid.
 pub fn note_solid(scene: &Scene, format: TableFormat) {
     let is_file = is_readable(Path::new(split_part(&scene.name).0));
     let is_boxes = scene.surfaces.is_none() && scene.own_tree.is_none();
@@ -124,7 +124,7 @@ pub fn or_left_out(
     Ok(Ending::Ok)
 }
 
-/// A study on its way.
+/// A study in progress.
 pub struct Study {
     pub workers: Workers,
     pub bar: ProgressBar,
@@ -134,19 +134,18 @@ pub struct Study {
 }
 
 impl Study {
-    /// A study of `before` steps and then of the processes that take the times.
+    /// A study of `before` steps, followed by the processes that time.
     ///
-    /// # Errors
-    /// The errors of [`Workers::new`]; an argument that is no text.
+    /// # Errors The errors of [`Workers::new`]; an argument that is not text.
     pub fn new(about: String, before: u64, spread: &SpreadArgs) -> anyhow::Result<Study> {
         let processes = spread.processes;
         let bar = progress(before + u64::from(processes), "");
         if !bar.is_hidden() {
-            // Elapsed time advances while a step takes long.
+            // Elapsed time advances during a long step.
             bar.enable_steady_tick(Duration::from_secs(1));
         }
         Ok(Study {
-            // They take as long as they take.
+            // No time limit.
             workers: Workers::new(typed_args()?, Duration::MAX, &std::env::temp_dir())?,
             bar,
             about,
@@ -177,7 +176,7 @@ impl Study {
 
     /// The times of all processes, one after the other, by the plan of the command.
     ///
-    /// From now on Ctrl-C stops the work at the next safe place; before it ends the program.
+    /// From now on Ctrl-C stops the work at the next safe point; before, it ends the program.
     pub fn times(
         self,
         step: &str,
@@ -185,7 +184,7 @@ impl Study {
         plan: &impl Serialize,
     ) -> anyhow::Result<Vec<ProcessTimes>> {
         interrupt::from_now_on_finish();
-        // What came before is no measure of the parts.
+        // Earlier steps say nothing about the duration of the parts.
         if self.bar.position() == 0 {
             self.bar.reset_elapsed();
         }

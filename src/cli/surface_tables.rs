@@ -1,6 +1,7 @@
-//! The crossover tables: which structure wins where, from how many items on the
-//! linear scan is beaten, and how cost grows. For the end of `run` and for
-//! `report`; read off a report, nothing is measured.
+//! The crossover tables: which structure wins where.
+//!
+//! Also the number of items from which a structure beats the linear scan, and the growth of costs.
+//! For the end of `run` and for `report`; evaluates a report, measures nothing.
 
 use super::diagram::{Diagram, Joined, Point, Series};
 use super::document::{Block, Column, Table};
@@ -16,8 +17,9 @@ fn title(surface: &Surface) -> String {
     format!("{}, {}, {}", surface.world, surface.cache, surface.test)
 }
 
-/// Rows are numbers of items, columns shares of them that are visible: who is
-/// fastest, and its speed-up vs linear.
+/// The fastest structures and their speed-up vs linear.
+///
+/// Rows are numbers of items, columns visible shares.
 fn winners(surface: &Surface) -> Table {
     let classes = surface.classes();
     let cells = surface.sizes().into_iter().flat_map(|size| {
@@ -31,8 +33,7 @@ fn winners(surface: &Surface) -> Table {
     Table::grid("items \\ visible", cells)
 }
 
-/// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest
-/// comes first.
+/// "wide = bvh: 12.3 (at 34.70 %)": those of the first rank, the fastest first.
 fn winner(place: &Place) -> String {
     let winners: Vec<&ReportCell> = place.comparison.winners().collect();
     let names: Vec<&str> = winners.iter().map(|c| c.structure.as_str()).collect();
@@ -46,7 +47,7 @@ fn winner(place: &Place) -> String {
     told
 }
 
-/// From how many items on each structure beats the linear scan.
+/// Number of items from which each structure beats the linear scan.
 fn crossings(surface: &Surface) -> Option<Table> {
     let classes = surface.classes();
     let trees = surface.names(|cell| !cell.is_scan()).into_iter();
@@ -67,7 +68,7 @@ fn crossings(surface: &Surface) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// An interpolated number is not known more finely.
+/// An interpolated number is not more precise.
 fn two_digits(items: f64) -> usize {
     let unit = 10f64.powi((items.max(1.0).log10().floor() as i32 - 1).max(0));
     ((items / unit).round() * unit) as usize
@@ -101,7 +102,7 @@ pub fn blocks(report: &Report) -> Vec<Block> {
     blocks
 }
 
-/// How cost grows at a fixed number of visible items.
+/// Growth of cost at a fixed number of visible items.
 fn of_growths(growths: &[Growth]) -> Table {
     let columns: &[Column<&Growth>] = &[
         ("world, path, cache, test", |g| {
@@ -126,7 +127,7 @@ fn of_growths(growths: &[Growth]) -> Table {
 
 /// Time against the number of items, a line per structure, named at its right end.
 ///
-/// One figure per class of shares that has at least two sizes; their axes are the same.
+/// One figure per class of shares with at least two sizes; their axes are the same.
 pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     let curve = |class: f64, name: &str| -> (usize, Vec<Point>) {
         let here = surface.places.iter().filter(|place| place.class == class);
@@ -188,7 +189,7 @@ pub fn growth(surface: &Surface) -> Vec<(String, Figure)> {
     figures.into_iter().map(figure).collect()
 }
 
-/// The shares that a class stands for, where it does not say it by itself.
+/// The measured shares of a class, unless its name shows them.
 fn measured(surface: &Surface, class: f64) -> String {
     let here = || surface.places.iter().filter(|place| place.class == class);
     if !here().any(Place::is_off_class) {
@@ -203,8 +204,9 @@ fn measured(surface: &Surface, class: f64) -> String {
 /// A name that fits a file, and a picture as SVG.
 pub type Picture = (String, String);
 
-/// A picture for each class of shares that has at least two sizes, and one for each
-/// scene and path that ranks anything.
+/// Pictures of each class of shares with at least two sizes.
+///
+/// And one for each scene and path with ranks.
 pub fn pictures(report: &Report) -> Vec<Picture> {
     let mut pictures: Vec<Picture> = Vec::new();
     let mut add = |words: [&str; 4], figure| {
@@ -232,12 +234,12 @@ pub fn pictures(report: &Report) -> Vec<Picture> {
     pictures
 }
 
-/// A name of its own, of less than the 255 bytes that file systems take.
+/// A unique name of less than the 255 bytes that file systems allow.
 fn file_name(words: [&str; 4], taken: &[Picture]) -> String {
     let words = words.map(|word| word.chars().take(70).collect::<String>());
     let name: String = slug(&words.join("-")).chars().take(200).collect();
     let is_free = |name: &String| taken.iter().all(|picture| picture.0 != *name);
-    // Two worlds may look the same to a file system.
+    // The names of two worlds may be equal to a file system.
     let others = (2..).map(|n| format!("{name}-{n}"));
     let mut names = [name.clone()].into_iter().chain(others);
     names.find(is_free).unwrap_or_default()

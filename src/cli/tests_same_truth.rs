@@ -1,6 +1,6 @@
-//! One camera, one truth: what `run`, `verify`, `precision` and `stress` judge
-//! by is the pose as written. A frame that is wrong on purpose must show in
-//! all four.
+//! `run`, `verify`, `precision` and `stress` share one truth: the pose as written.
+//!
+//! A frame that is wrong on purpose must show in all four.
 
 use super::verify::judge_camera_level;
 use crate::camera::{Camera, Lens, PlaneOptions, look_at};
@@ -24,7 +24,7 @@ fn sound() -> Camera {
     }
 }
 
-/// The same numbers, but axes that are rolled by 1e-3 degrees.
+/// The same numbers, but axes rolled by 1e-3 degrees.
 fn broken() -> Camera {
     let camera = sound();
     let mut rolled = camera.frame;
@@ -35,7 +35,7 @@ fn broken() -> Camera {
     }
 }
 
-/// Points along the edges of the view, just within.
+/// Points along the edges of the view, just inside.
 fn scene() -> Scene {
     let camera = sound();
     let corners = camera.lens.corners(&camera.frame).expect("corners");
@@ -50,7 +50,7 @@ fn scene() -> Scene {
     Scene::from_boxes("edges", &boxes).expect("a scene")
 }
 
-/// False negatives by `run`, `verify`, `precision` and `stress`.
+/// Returns whether `run`, `verify`, `precision` and `stress` find false negatives.
 fn missed(camera: Camera) -> [bool; 4] {
     let scene = scene();
     let path = CameraPath {

@@ -6,7 +6,7 @@ use std::iter;
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 
-/// How many columns of a terminal a text takes: two for each character of Chinese.
+/// Terminal columns of a text: two for each Chinese character.
 pub use console::measure_text_width as across;
 
 pub use crate::shown::*;
@@ -19,24 +19,24 @@ pub fn items(count: usize, left_out: usize) -> String {
     joined([counted(count, "item"), bad])
 }
 
-/// Text on things that are counted; nothing if there are none.
+/// Text about counted things; empty if there are none.
 pub fn any(count: usize, thing: &str, show: impl FnOnce(String) -> String) -> String {
     some((count > 0).then(|| counted(count, thing)), show)
 }
 
-/// A figure as text; nothing if there is none.
+/// A figure as text; empty if there is none.
 pub fn some<T>(value: Option<T>, show: impl FnOnce(T) -> String) -> String {
     value.map(show).unwrap_or_default()
 }
 
-/// Texts that are not empty, with commas between them.
+/// Texts that are not empty, separated by commas.
 pub fn joined(texts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     let texts = texts.into_iter().map(|text| text.as_ref().to_owned());
     let texts: Vec<String> = texts.filter(|text| !text.is_empty()).collect();
     texts.join(", ")
 }
 
-/// "Cold, six-box: Take wide .."; the sentence alone where nothing is named.
+/// "Cold, six-box: Take wide .."; the sentence alone if the name is empty.
 pub fn labelled(name: &str, sentence: &str) -> String {
     let (first, rest) = name.split_at(name.chars().next().map_or(0, char::len_utf8));
     match name {
@@ -54,7 +54,7 @@ pub fn range(all: impl Iterator<Item = usize> + Clone, shown: impl Fn(usize) -> 
     }
 }
 
-/// Basis of the times of a report, and what of its plan is not in it.
+/// Basis of the times of a report, and the missing parts of its plan.
 pub fn conclusion(report: &Report) -> String {
     basis_of_times(report) + &missing(report)
 }
@@ -98,7 +98,7 @@ fn basis_of_times(report: &Report) -> String {
     format!("95 % intervals over {over}{few}{check}")
 }
 
-/// Three significant digits without zeros at the end: 12.5, 9, 0.05.
+/// Three significant digits without trailing zeros: 12.5, 9, 0.05.
 pub fn short(value: f64) -> String {
     let text = significant(value);
     match text.contains('.') && !text.contains('e') {
@@ -125,7 +125,7 @@ pub fn time_plus_minus(ns: Option<Estimate>) -> String {
     })
 }
 
-/// A value with a margin, or with its interval where an end is far.
+/// A value with a margin, or with its interval if an end is far.
 fn with_ends(found: Estimate) -> String {
     let value = found.value;
     let is_near = |end: f64| value == 0.0 || (end / value).ln().abs() < 0.5;
@@ -138,10 +138,10 @@ fn with_ends(found: Estimate) -> String {
     }
 }
 
-/// A value with a margin, to the digit that the margin leaves.
+/// A value with a margin, rounded to the margin's leading digit.
 ///
-/// A value below that digit has one more: "83.4±0.7", "560000±9000", "70±200", "0.2±4.0".
-/// Zero is shown by its upper bound: "<0.0005".
+/// A value below that digit has one more: "83.4±0.7", "560000±9000", "70±200", "0.2±4.0". Zero is
+/// shown by its upper bound: "<0.0005".
 pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
         return significant(value);
@@ -153,7 +153,7 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
         _ => of_margin,
     };
     let shown = (value / unit).round() * unit;
-    // A margin is rounded up, or it would no longer hold what it held.
+    // A margin is rounded up, or it might not cover the interval any more.
     let margin = ((margin + (value - shown).abs()) / of_margin - 1e-9).ceil() * of_margin;
     let decimals = (-unit.log10().round()).max(0.0) as usize;
     match value == 0.0 {
@@ -164,8 +164,8 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
 
 /// A time in ns or ms with its uncertainty: "3.64 us ± 11 %".
 ///
-/// A share where the interval is nearly symmetric in the logarithm, elsewhere its ends;
-/// nothing if one is not known.
+/// A share if the interval is nearly symmetric in the logarithm, else its ends; empty if an end is
+/// unknown.
 pub fn time_with(metric: &Metric) -> String {
     let size = [1.0, 1e6][usize::from(metric.unit == "ms")];
     let ns = metric.estimate().times(size);
@@ -182,14 +182,14 @@ pub fn time_with(metric: &Metric) -> String {
     time(value) + &uncertainty
 }
 
-/// A rate per `units` with its 95 % interval; nothing if there is none.
+/// A rate per `units` with its 95 % interval; empty if there is none.
 pub fn rate(rate: Option<Estimate>, units: f64) -> String {
     some(rate.map(|rate| rate.times(units)), with_ends)
 }
 
-/// Text with line breaks in place of spaces in lines longer than `width`.
+/// Text with spaces replaced by line breaks in lines longer than `width`.
 ///
-/// The rest of an indented line is indented as well.
+/// Continuations of an indented line are indented as well.
 pub fn wrapped(text: &str, width: usize) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in text.split('\n') {
@@ -213,7 +213,7 @@ pub fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
-/// A name and a text per row, the text wrapped into a column of its own.
+/// A name and a text per row, the text wrapped in its own column.
 pub fn entries<T: AsRef<str>>(rows: impl IntoIterator<Item = [T; 2]>, width: usize) -> String {
     let rows: Vec<[T; 2]> = rows.into_iter().collect();
     let names = rows.iter().map(|[name, _]| name.as_ref().chars().count());
@@ -230,7 +230,7 @@ pub fn entries<T: AsRef<str>>(rows: impl IntoIterator<Item = [T; 2]>, width: usi
     all
 }
 
-/// " [lower, upper]" in a unit; nothing without ends.
+/// " [lower, upper]" in a unit; empty without ends.
 pub fn interval(ends: Option<[f64; 2]>, unit: f64) -> String {
     some(ends, |ends| {
         let [lower, upper] = ends.map(|end| significant(end / unit).replace(',', ""));
@@ -238,7 +238,7 @@ pub fn interval(ends: Option<[f64; 2]>, unit: f64) -> String {
     })
 }
 
-/// Basis of the times of a study, with the ratio of what was measured twice.
+/// Basis of the times of a study, with the ratio of the task timed twice.
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
     let twice = |twin: &Estimate| format!(" (measured twice: {} times as long)", within(*twin));
@@ -248,8 +248,9 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     }
 }
 
-/// Basis of the times of a table: "10 processes, 100 rounds each; 64 cameras timed,
-/// 128 checked, 8 of them against the oracle".
+/// Basis of the times of a table.
+///
+/// "10 processes, 100 rounds each; 64 cameras timed, 128 checked, 8 of them against the oracle".
 pub fn basis(comparison: &Comparison) -> String {
     if comparison.timed(|_| 0).next().is_none() {
         return "no times".to_owned();
@@ -275,7 +276,7 @@ pub fn sources(errors: ErrorCount) -> String {
     sources.map(|items| items.to_string()).join("/")
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a shell.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,%+@".contains(c);
     match !word.is_empty() && word.chars().all(is_plain) {
@@ -284,7 +285,7 @@ pub fn quoted(word: &str) -> String {
     }
 }
 
-/// Text of an element or an attribute.
+/// Escaped text of an element or an attribute.
 pub fn html(text: &str) -> String {
     let text = plain(text).replace('&', "&amp;").replace('<', "&lt;");
     let text = text.replace('>', "&gt;").replace('"', "&quot;");
@@ -308,14 +309,14 @@ pub fn short_percent(share: f64) -> String {
     }
 }
 
-/// Columns of the terminal behind standard output; 80 of anything else.
+/// Columns of the terminal of standard output; 80 for anything else.
 pub fn width() -> usize {
     let size = console::Term::stdout().size_checked();
     let columns = size.map(|(_, columns)| usize::from(columns));
     columns.filter(|columns| *columns > 0).unwrap_or(80)
 }
 
-/// Prints text for people, without control characters from outside.
+/// Prints text without control characters from outside.
 pub fn print(parts: &[String]) -> io::Result<()> {
     let text = lines(&parts.join("\n")) + "\n";
     io::stdout().lock().write_all(text.as_bytes())

@@ -1,6 +1,7 @@
-//! `cullbench verify`: every structure on every scene and path against the
-//! reference scan, then random differential cases. Prints the first
-//! difference of each kind with what is needed to see it again.
+//! `cullbench verify`: every structure, scene and path against the reference scan.
+//!
+//! Then random differential cases. Prints the first difference of each kind with the command that
+//! reproduces it.
 
 use std::io;
 use std::time::Instant;
@@ -30,7 +31,7 @@ use crate::verify::{
 
 /// Verdicts of the oracle for each scene and path.
 const MOST_JUDGED: usize = 60_000;
-/// Items of a generated scene when none is named.
+/// Items of a generated scene if none is named.
 const ITEMS: usize = 5_000;
 const PATHS: [&str; 4] = [
     "flythrough:frames=32",
@@ -113,8 +114,9 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(outcome.ok))
 }
 
-/// Checks all structures, over boxes and over spheres, on the cameras of one path,
-/// with every kind of volume; one row per structure.
+/// Checks all structures on the cameras of one path; one row per structure.
+///
+/// Over boxes and over spheres, with every kind of volume.
 fn check_path(
     scene: &Scene,
     cameras: &CameraPath,
@@ -136,7 +138,7 @@ fn check_path(
             rows = checked;
             continue;
         }
-        // The first difference stays.
+        // The first difference is kept.
         for (row, more) in rows.iter_mut().zip(checked) {
             row.volumes += more.volumes;
             row.verdicts += more.verdicts;
@@ -156,8 +158,9 @@ fn paths(args: &VerifyArgs, scene: &Scene) -> Vec<String> {
     PATHS.into_iter().chain(own).map(str::to_owned).collect()
 }
 
-/// The queries of a path for each kind of volume, and for each other culling test
-/// and arithmetic; only the first has the points to locate.
+/// The queries of a path for each kind of volume, culling test and arithmetic.
+///
+/// Only the first has the points to locate.
 fn workloads<'a>(
     scene: &'a Scene,
     cameras: &CameraPath,
@@ -174,7 +177,7 @@ fn workloads<'a>(
         all.push(((*kind).to_owned(), workload));
     }
     for (i, camera) in cameras.cameras.iter().enumerate() {
-        // None where f32 holds no six planes, which is a line of `left_out`.
+        // None if f32 cannot hold six planes, which `left_out` reports.
         let volumes = variants(camera, &culling.planes, &around, i).unwrap_or_default();
         for (kind, volume) in volumes.into_iter().skip(1) {
             let of_kind = all.iter_mut().find(|(name, _)| name == kind);
@@ -195,8 +198,10 @@ fn workloads<'a>(
     Ok(all)
 }
 
-/// Checks the reference's answers, which all structures that agreed share, against
-/// the oracle, for some of the cameras; points on their faces where the planes are safe.
+/// Checks the reference's answers against the oracle, for some of the cameras.
+///
+/// All structures that agreed share these answers. Includes points on the cameras' faces if the
+/// planes are safe.
 pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
     let (missed, or_points) = match workload.culling.unproven().is_none() {
@@ -204,7 +209,7 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
             errors += on_the_faces(workload);
             (errors.dropped(), " (or points on the faces)")
         }
-        // Contacts are not promised.
+        // Contacts have no guarantee.
         false => (errors.false_negatives, ""),
     };
     if missed == 0 {
@@ -221,9 +226,10 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
     }
 }
 
-/// How the views differ from the truth about points on their own faces: few
-/// scenes have boxes so near. The scene bounds what the epsilon is for, so
-/// points beyond it are left out.
+/// Differences of the views from the truth for points on their own faces.
+///
+/// Few scenes have boxes that near. The epsilon is made for the scene's extent, so points beyond it
+/// are left out.
 fn on_the_faces(workload: &Workload) -> ErrorCount {
     let around = workload.scene.surroundings();
     let mut errors = ErrorCount::default();
@@ -311,8 +317,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
     checks
 }
 
-/// Compares the answers of one structure to a random case with those of the
-/// reference.
+/// Compares one structure's answers to a random case with those of the reference.
 fn differ(
     case: &RandomCase,
     index: &dyn DynIndex,
@@ -348,10 +353,10 @@ fn differ(
     Ok(())
 }
 
-/// Scene of the random cases.
+/// Name of the random cases in place of a scene.
 const RANDOM: &str = "random";
 
-/// One structure on one scene and path (or on all random cases).
+/// One structure on one scene and path, or on all random cases.
 #[derive(Default, Serialize)]
 pub struct Check {
     scene: String,
@@ -360,7 +365,7 @@ pub struct Check {
     volumes: usize,
     verdicts: u64,
     status: Status,
-    /// The first difference and the command that shows it again.
+    /// The first difference and the command that reproduces it.
     pub difference: Option<String>,
 }
 
@@ -370,14 +375,14 @@ struct Outcome {
     verdicts: u64,
     /// Bad items that were left out of the scenes.
     skipped_items: usize,
-    /// Checks with a difference, however many verdicts are wrong in each.
+    /// Number of checks with a difference, however many verdicts in each are wrong.
     mismatches: usize,
     /// True if answers were compared with the cameras as written too.
     against_cameras: bool,
     seconds: f64,
     seed: u64,
     cases: u64,
-    /// Culling tests that have no view of a camera, each with the reason.
+    /// Culling tests without a view of a camera, each with the reason.
     left_out: Vec<String>,
     checks: Vec<Check>,
 }

@@ -31,9 +31,9 @@ use crate::scene::{Scene, Surfaces};
 use crate::verify::Truth;
 use crate::visibility::Rays;
 
-/// Most items that a browser is given to draw.
+/// Most items for a browser to draw.
 const MOST_ITEMS: usize = 2_000_000;
-/// Most triangles; of more the boxes of the items are drawn.
+/// Most triangles; beyond, the boxes of the items are drawn.
 const MOST_TRIANGLES: usize = 300_000;
 
 pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
@@ -77,7 +77,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let questions = ("camera", views);
     let agree = ask_all(&structures, &scene, boxes, questions, true, ask, &mut each)?;
     let costs = grouped(costs.into_iter());
-    // Of the first structure that has some.
+    // Nodes of the first structure that has any.
     let nodes = structures.iter().find_map(|spec| {
         let index = spec.build(input_of(&scene, boxes)).ok()?;
         let cells = index.cells();
@@ -187,7 +187,7 @@ fn fates(
     truth: Option<&Truth>,
     front: Option<&[ItemId]>,
 ) -> Vec<Fate> {
-    // Floors and ceilings of a map come behind its items.
+    // Floors and ceilings of a map follow its items.
     let set = |ids: &[ItemId]| {
         let mut set = vec![false; items];
         let own = ids.iter().map(|&id| id as usize).filter(|&id| id < items);
@@ -253,7 +253,7 @@ fn clip_matrix(camera: &Camera, origin: DVec3, is_downward: bool) -> DMat4 {
     DMat4::from_cols(x, y, z, w).transpose() * DMat4::from_translation(origin)
 }
 
-/// Most nodes of a view that are drawn.
+/// Most nodes drawn per view.
 const MOST_NODES: usize = 256;
 
 /// Digits of packed numbers, safe in JSON and HTML.
@@ -285,10 +285,10 @@ impl Packed {
     }
 }
 
-/// Kinds of an item or node in a view, at most.
+/// Most kinds of an item or node in a view.
 const KINDS: usize = 5;
 
-/// Kinds as packed runs: the length less 1, times [`KINDS`], plus the kind.
+/// Run-length encoding of kinds: (length - 1) * [`KINDS`] + kind.
 fn runs(kinds: &[u8]) -> String {
     let mut packed = Packed::default();
     for run in kinds.chunk_by(u8::eq) {
@@ -297,9 +297,9 @@ fn runs(kinds: &[u8]) -> String {
     packed.0
 }
 
-/// Places that the page draws: steps from the lowest corner of all items.
+/// Grid of drawn positions: steps from the lowest corner of all items.
 struct Grid {
-    /// Steps per axis that corners are rounded to, outward.
+    /// Steps per axis to which corners are rounded, outward.
     steps: u32,
     /// Lowest corner of all items, scene-local.
     low: DVec3,
@@ -308,7 +308,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// The grid of a scene with some triangles.
+    /// The grid of a scene with this number of triangles.
     fn of(scene: &Scene, triangles: usize) -> Grid {
         let bounds = scene.world_bounds();
         Grid {
@@ -319,7 +319,7 @@ impl Grid {
         }
     }
 
-    /// Steps to a point; nodes may reach beyond the items.
+    /// Position of a point in steps; nodes may reach beyond the items.
     fn at(&self, point: Vec3) -> DVec3 {
         let steps = f64::from(self.steps);
         let scale = self.extent.map(|e| if e > 0.0 { steps / e } else { 0.0 });
@@ -343,7 +343,7 @@ impl Grid {
         order.into_iter().map(|(_, item)| item).collect()
     }
 
-    /// Lower corner of each box less the one before, signed, and the extents.
+    /// Lower corner of each box minus the previous one, signed, and the extents.
     fn boxes<'b>(&self, boxes: impl Iterator<Item = &'b Aabb>) -> String {
         let (mut packed, mut before) = (Packed::default(), I64Vec3::ZERO);
         for b in boxes {
@@ -358,11 +358,11 @@ impl Grid {
 
     /// Triangles of the items in their order.
     ///
-    /// How many each has; for each corner 0 if its point is new, else how many came since,
-    /// from 1; the points less the one before, signed.
+    /// Three texts: triangles per item; for each corner 0 if its point is new, else how many new
+    /// points ago it came, from 1; each point minus the previous one, signed.
     fn mesh(&self, all: &Surfaces, order: &[ItemId]) -> [String; 3] {
         let [mut counts, mut corners, mut points] = <[Packed; 3]>::default();
-        // Numbers from 1 of points that came.
+        // Index of each point, from 1, in order of occurrence.
         let mut numbers = vec![0; all.points.len()];
         let (mut count, mut before) = (0, I64Vec3::ZERO);
         for &item in order {
@@ -387,7 +387,7 @@ impl Grid {
 
     /// Nodes that queries visit: their boxes, and for each view the kinds of all.
     ///
-    /// Rejected (1), opened or accepted; of a view the [`MOST_NODES`] of the upper levels.
+    /// Rejected (1), opened or accepted; per view the [`MOST_NODES`] of the upper levels.
     fn nodes(&self, cells: &[TreeCell<'_>], views: &[CameraView]) -> Value {
         let kinds = views.iter().map(|view| {
             let found = cells.iter().zip(verdicts(cells, view.as_any())).enumerate();

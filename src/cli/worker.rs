@@ -1,7 +1,7 @@
-//! The child's side of what is measured over processes: `cullbench worker`.
+//! The child's side of measurements over processes: `cullbench worker`.
 //!
-//! No command for people. It reads one request, does one process's share of a job, and
-//! writes steps and results to standard output, a JSON line each.
+//! Not a command for users. It reads one request, does one process's share of a job, and writes
+//! steps and results to standard output, a JSON line each.
 
 use std::io::{self, BufRead, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -43,7 +43,7 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
 
 fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
     let at = Arc::new(At::default());
-    // Before the processor is chosen: it may wake up on another one.
+    // Before the processor is chosen: the thread may wake up on another one.
     at.clone().tell_of_turns();
     let _held = vary_layout(request.layout);
     crate::input::hold_files(request.files);
@@ -63,7 +63,7 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
                 Command::Advise(args) => advise::plan(registry, &args)?,
                 _ => bail!(OTHER),
             };
-            // Threads that are started later stay where this one does.
+            // Threads that are started later inherit this thread's processor.
             if !plan.structures.iter().any(StructureSpec::is_threaded) {
                 stay_on(request.cpu);
             }
@@ -98,9 +98,9 @@ fn answer(registry: &Registry, request: Request) -> anyhow::Result<()> {
 
 /// Current step of the process.
 ///
-/// Turns of a timed pass, and steps that are repeated, are too short to report each: a
-/// thread reports the current one every second, as long as they come and go. Then silence
-/// means a turn that does not end, and the parent has its structure.
+/// Turns of a timed pass, and repeated steps, are too short to report each: a thread reports the
+/// current one every second, as long as they change. So silence means a turn that does not end, and
+/// the parent knows its structure.
 #[derive(Default)]
 struct At {
     turns: AtomicU64,
@@ -130,7 +130,7 @@ impl At {
             loop {
                 thread::sleep(HEARTBEAT);
                 let turns = self.turns.load(Ordering::Relaxed);
-                // The main thread finds the closed pipe by itself.
+                // The main thread detects the closed pipe by itself.
                 if turns != told && send(&self.message()).is_err() {
                     return;
                 }
@@ -140,21 +140,22 @@ impl At {
     }
 }
 
-/// Sends a message; ends this process where the parent is gone.
+/// Sends a message; ends this process if the parent is gone.
 fn tell(message: &Message) {
     if send(message).is_err() {
         std::process::exit(ORPHANED);
     }
 }
 
-/// Ends this process with its parent: standard input has nothing after the request,
-/// so its end is that of the parent.
+/// Ends this process together with its parent.
+///
+/// Standard input has nothing after the request, so it ends when the parent does.
 fn end_with_the_parent() {
     thread::spawn(|| {
         let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
         std::process::exit(ORPHANED);
     });
-    // A process that is held does not see the end of its input.
+    // A suspended process does not notice the end of its input.
     #[cfg(target_os = "linux")]
     let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }
@@ -166,24 +167,25 @@ fn send(message: &Message) -> io::Result<()> {
     out.flush()
 }
 
-/// Keeps this process on one processor, where the system can: it does not move
-/// in the middle of a round.
+/// Pins this process to one processor, if the system can.
+///
+/// So it does not migrate in the middle of a round.
 fn stay_on(cpu: Option<usize>) {
     #[cfg(target_os = "linux")]
     if let Some(cpu) = cpu {
         let mut set = rustix::thread::CpuSet::new();
         set.set(cpu);
-        // A processor that is not ours is no reason not to measure.
+        // An unavailable processor is no reason not to measure.
         let _ = rustix::thread::sched_setaffinity(None, &set);
     }
     #[cfg(not(target_os = "linux"))]
     let _ = cpu;
 }
 
-/// Takes memory and gives some of it back, so that what is built lies elsewhere
-/// in every process. Without it a system hands the pages of the last process to
-/// the next one: the pairs of a comparison would all compare the same two
-/// layouts, and differ by some percent for nothing.
+/// Allocates memory and frees some of it, to vary the memory layout per process.
+///
+/// Otherwise a system reuses the pages of the last process: all pairs of a comparison would compare
+/// the same two layouts, with a spurious difference of some percent.
 fn vary_layout(seed: u64) -> Vec<Vec<u8>> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut held = Vec::new();
