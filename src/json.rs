@@ -44,7 +44,8 @@ impl JsonError {
 
 /// Reads a value, skipping a leading byte order mark.
 ///
-/// # Errors Bytes that are not UTF-8, not JSON, or of another form.
+/// # Errors
+/// Bytes that are not UTF-8, not JSON, or of another form.
 pub fn from_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, JsonError> {
     // The byte order mark that some editors write.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);

@@ -64,7 +64,8 @@ impl Suite {
     /// If given, `default` replaces the structures of a built-in suite, and of a file that names
     /// none.
     ///
-    /// # Errors An unknown name; a file that cannot be read or is not a suite, with its line.
+    /// # Errors
+    /// An unknown name; a file that cannot be read or is not a suite, with its line.
     pub fn of(text: &str, default: Option<&str>) -> Result<Suite, InputError> {
         let mut suite = match text.ends_with(".toml") {
             true => return written(text, default),

@@ -45,7 +45,8 @@ impl Pool {
 /// If the system creates fewer threads, those do the work. Starting a thread takes about 20 to 50
 /// us: jobs pay from a fraction of a millisecond on.
 ///
-/// # Panics If a job panics.
+/// # Panics
+/// If a job panics.
 pub fn share<J: Send>(
     threads: usize,
     jobs: impl Iterator<Item = J> + Send,
@@ -68,7 +69,8 @@ pub fn share<J: Send>(
 
 /// Results of jobs in their order, done as [`share`] does them.
 ///
-/// # Panics If a job panics.
+/// # Panics
+/// If a job panics.
 pub fn map<J: Send, R: Send>(
     threads: usize,
     jobs: impl Iterator<Item = J> + Send,
@@ -104,7 +106,8 @@ pub struct Workers {
 impl Workers {
     /// At least 1, at most 256 threads.
     ///
-    /// # Errors The system cannot create that many threads.
+    /// # Errors
+    /// The system cannot create that many threads.
     pub fn new(threads: usize) -> Result<Workers, rayon::ThreadPoolBuildError> {
         let threads = threads.clamp(1, MOST_THREADS);
         let others = rayon::ThreadPoolBuilder::new().num_threads((threads - 1).max(1));
@@ -114,7 +117,8 @@ impl Workers {
 
     /// [`share`] among these threads, which start within microseconds.
     ///
-    /// # Panics If a job panics.
+    /// # Panics
+    /// If a job panics.
     pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
         let most = jobs.size_hint().1.unwrap_or(usize::MAX);
         let work_off = queue(jobs, work);

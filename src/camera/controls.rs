@@ -89,7 +89,8 @@ impl Frame {
     /// First by `around` degrees about `axis` (through the centre), then by `over` degrees about
     /// the camera's own u. Keeps distance and bearing to the centre.
     ///
-    /// # Errors An axis of length zero, or a value that is not finite; the frame is unchanged.
+    /// # Errors
+    /// An axis of length zero, or a value that is not finite; the frame is unchanged.
     pub fn orbit(&mut self, centre: DVec3, axis: DVec3, around: f64, over: f64) -> Result<()> {
         let found = format_args!("the axis of the orbit is zero or not finite");
         let is_direction = axis.is_finite() && axis != DVec3::ZERO;

@@ -59,7 +59,8 @@ impl Pose {
     ///
     /// However near up is to the direction of view and look to the eye: the cross product is exact.
     ///
-    /// # Errors The errors of [`look_at`].
+    /// # Errors
+    /// The errors of [`look_at`].
     pub(super) fn axes(&self) -> Result<[DVec3; 2]> {
         let (eye, name, towards, up) = match *self {
             Pose::LookAt { eye, look, up } => (eye, "look", look, up),
@@ -135,8 +136,9 @@ pub struct Frame {
 /// near `up` is to the direction of view and `look` to the eye. Vectors are scaled before they are
 /// squared, so lengths from 1e-300 to 1e300 work.
 ///
-/// # Errors A value that is not finite, `eye == look`, `up` zero or within 9e-16 rad of the
-/// direction of view or its opposite.
+/// # Errors
+/// A value that is not finite, `eye == look`, `up` zero or within 9e-16 rad of the direction of
+/// view or its opposite.
 pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame> {
     Pose::LookAt { eye, look, up }.frame()
 }
@@ -181,7 +183,8 @@ impl Pose {
 impl Frame {
     /// The frame at `eye` that looks along `forward`.
     ///
-    /// # Errors The errors of [`look_at`]; `forward` zero in place of `eye == look`.
+    /// # Errors
+    /// The errors of [`look_at`]; `forward` zero in place of `eye == look`.
     pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame> {
         Pose::Forward { eye, forward, up }.frame()
     }

@@ -54,9 +54,9 @@ impl Lens {
     ///
     /// Without `far` the view volume is infinite.
     ///
-    /// # Errors fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0 or beyond
-    /// 1e100, near >= far, a value that is not finite. A far plane beyond [`FARTHEST`] counts as
-    /// infinite.
+    /// # Errors
+    /// fov outside (0, 180), aspect outside 1e-100 to 1e100, near not above 0, beyond 1e100 or
+    /// not below far, a value that is not finite. A far plane beyond [`FARTHEST`] is infinite.
     pub fn perspective(fovy_deg: f64, aspect: f64, near: f64, far: Option<f64>) -> Result<Lens> {
         Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
@@ -81,8 +81,8 @@ impl Lens {
 
     /// A lens of any kind but a matrix.
     ///
-    /// # Errors The errors of the kind's constructor; an orthographic lens without far plane; a
-    /// matrix.
+    /// # Errors
+    /// The errors of the kind's constructor; an orthographic lens without far plane; a matrix.
     pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens> {
         match kind {
             LensKind::Perspective { fovy_deg, aspect } => {
@@ -251,7 +251,8 @@ impl Camera {
     /// if the matrix is orthographic) and the direction of view; turning or moving it does not
     /// change visibility.
     ///
-    /// # Errors The errors of [`ViewProjection::new`].
+    /// # Errors
+    /// The errors of [`ViewProjection::new`].
     pub fn of_matrix(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<Camera> {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));

@@ -21,9 +21,9 @@ pub(super) const TINY: f64 = f64::from_bits((1023 - 147) << 52);
 /// and 2 for the rounding of the eye itself.
 ///
 /// Depths of near and far and windows of orthographic lenses need no share, though offsets of such
-/// planes round them twice. At a distance D from the plane such a length is at most `|x|` + `|eye|`
-/// + D. Two units of `|x|` + `|eye|` fit into the 16, as the normal is an axis with 4; two units of
-/// D are far less than D itself, which is added to the value at x.
+/// planes round them twice. At a distance D from the plane such a length is at most
+/// `|x| + |eye| + D`. Two units of `|x| + |eye|` fit into the 16, as the normal is an axis with 4;
+/// two units of D are far less than D itself, which is added to the value at x.
 const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// Upper bound of the sums of the plane test: half the largest f32.
@@ -68,7 +68,8 @@ impl Margin {
     ///
     /// `of_scene` is the scene's reach in these coordinates, zero if unknown.
     ///
-    /// # Errors An epsilon or a reach for which nothing is guaranteed.
+    /// # Errors
+    /// An epsilon or a reach for which nothing is guaranteed.
     pub(super) fn new(
         camera: &Camera,
         zero: &[DVec3],
@@ -198,7 +199,8 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
 
 /// Checks that no sum of the plane test can overflow for boxes within `reach`.
 ///
-/// # Errors The largest possible sum, if one can.
+/// # Errors
+/// The largest possible sum, if one can.
 pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<()> {
     let sums = volume.planes().iter().map(|p| largest_sum(p, reach));
     let largest = sums.fold(0.0, f64::max);

@@ -97,8 +97,9 @@ impl ViewProjection {
     ///
     /// Transpose an array stored by columns.
     ///
-    /// # Errors An entry that is not finite, or neither zero nor of a size from 1e-60 to 1e60; a
-    /// singular matrix; one whose clip volume is empty.
+    /// # Errors
+    /// An entry that is not finite, or neither zero nor of a size from 1e-60 to 1e60; a singular
+    /// matrix; one whose clip volume is empty.
     pub fn new(entries: [[f64; 4]; 4], convention: MatrixConvention) -> Result<ViewProjection> {
         for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
             super::finite(name, value)?;

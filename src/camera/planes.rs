@@ -90,10 +90,11 @@ impl Camera {
     /// a point x of it, and the p-vertex evaluates no lower than x (rounding is monotone); the
     /// error at x is less than the margin. docs/NUMERICS.md has the proof.
     ///
-    /// # Errors [`CameraError::Volume`] if a plane does not fit f32 (or the chosen method loses
-    /// it); [`CameraError::Sums`] if a sum of the plane test could overflow within the
-    /// surroundings' reach; [`CameraError::Invalid`] for an epsilon or a reach that is negative or
-    /// NaN, or an infinite epsilon.
+    /// # Errors
+    /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen method loses it);
+    /// [`CameraError::Sums`] if a sum of the plane test could overflow within the surroundings'
+    /// reach; [`CameraError::Invalid`] for an epsilon or a reach that is negative or NaN, or an
+    /// infinite epsilon.
     pub fn volume(&self, options: &PlaneOptions, around: &Surroundings) -> Result<ConvexVolume> {
         self.volume_with(&[], options, around)
     }
@@ -103,7 +104,8 @@ impl Camera {
     /// Each plane is rounded to f32 and moved outward like the six: its own error must be small
     /// against 2^-24. Planes that f32 cannot hold are omitted, which is always safe.
     ///
-    /// # Errors The errors of [`Camera::volume`]; more planes than a volume can hold.
+    /// # Errors
+    /// The errors of [`Camera::volume`]; more planes than a volume can hold.
     pub fn volume_with(
         &self,
         more: &[PlaneF64],
@@ -120,7 +122,8 @@ impl Camera {
 
     /// The planes of the frame in f64, without a margin.
     ///
-    /// # Errors [`CameraError::Volume`] if a plane does not even fit f64.
+    /// # Errors
+    /// [`CameraError::Volume`] if a plane does not even fit f64.
     pub fn convex_volume_f64(&self, around: &Surroundings) -> Result<ConvexVolumeF64> {
         let planes = self.planes_f64(&[around.origin]).into_iter();
         let planes: Vec<PlaneF64> = planes.map(|(_, plane)| plane).collect();
@@ -144,8 +147,9 @@ impl Camera {
     /// Further planes are relative to the unrounded eye and of unit length: see
     /// [`Camera::volume_with`].
     ///
-    /// # Errors [`CameraError::Volume`] if the eye or a plane does not fit f32; more planes than a
-    /// volume can hold.
+    /// # Errors
+    /// [`CameraError::Volume`] if the eye or a plane does not fit f32; more planes than a volume
+    /// can hold.
     pub fn relative_volume(
         &self,
         more: &[PlaneF64],

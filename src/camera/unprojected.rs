@@ -49,7 +49,8 @@ impl Unprojected {
 impl ViewProjection {
     /// The frame and the lens that this matrix was made from.
     ///
-    /// # Errors A view that no lens describes, such as one with coincident near and far planes.
+    /// # Errors
+    /// A view that no lens describes, such as one with coincident near and far planes.
     pub fn unprojected(&self) -> Result<Unprojected> {
         let along = |row: usize| DVec3::from_slice(&self.rows[row]);
         let [x, y, z, w] = [0, 1, 2, 3].map(along);
@@ -159,7 +160,8 @@ impl ViewProjection {
 impl Camera {
     /// This camera with its own frame and a lens whose rays are known.
     ///
-    /// # Errors A matrix whose image is sheared or whose near plane is oblique.
+    /// # Errors
+    /// A matrix whose image is sheared or whose near plane is oblique.
     pub fn unprojected(&self) -> Result<Camera> {
         let Some(matrix) = self.lens.matrix() else {
             return Ok(*self);

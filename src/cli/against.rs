@@ -214,8 +214,8 @@ impl Duel<'_> {
     ///
     /// Returns the changes, and their basis in words.
     ///
-    /// # Errors A program that cannot be started or is of another version, a scene that it cannot
-    /// read.
+    /// # Errors
+    /// A program that cannot be started or is of another version, a scene that it cannot read.
     fn run(&mut self) -> Result<(Changes, String)> {
         let started = Instant::now();
         let (first, most) = pairs(self.args);

@@ -35,7 +35,8 @@ pub fn heard() -> bool {
 
 /// Fails after a request to stop.
 ///
-/// # Errors [`Interrupted`].
+/// # Errors
+/// [`Interrupted`].
 pub fn check() -> Result<(), Interrupted> {
     (!asked()).then_some(()).ok_or(Interrupted)
 }

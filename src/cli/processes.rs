@@ -65,7 +65,8 @@ pub struct Worker {
 impl Worker {
     /// Waits for the next message; `None` without one within `wait`.
     ///
-    /// # Errors A message that no worker of this version sends, or that its scene cannot be loaded;
+    /// # Errors
+    /// A message that no worker of this version sends, or that its scene cannot be loaded;
     /// [`Died`], whether observed or caused here.
     pub fn listen(&mut self, wait: Duration) -> anyhow::Result<Option<Message>> {
         let gap = std::mem::replace(&mut self.looked, Instant::now()).elapsed();
@@ -179,7 +180,8 @@ pub struct Workers {
 impl Workers {
     /// Workers of this program; files in `folder` replace pipes.
     ///
-    /// # Errors Such a file cannot be written.
+    /// # Errors
+    /// Such a file cannot be written.
     pub fn new(args: Vec<String>, patience: Duration, folder: &Path) -> anyhow::Result<Workers> {
         let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
         for (source, bytes) in input::pipes() {
@@ -209,7 +211,8 @@ impl Workers {
 
     /// Starts a worker on the next processor; `layout` determines its memory layout.
     ///
-    /// # Errors The program cannot be started.
+    /// # Errors
+    /// The program cannot be started.
     pub fn start(&self, process: u32, layout: u64, job: Job) -> anyhow::Result<Worker> {
         let request = Request {
             protocol: PROTOCOL,
@@ -279,7 +282,8 @@ impl Workers {
 
     /// Runs a job in a separate process, on the next processor.
     ///
-    /// # Errors The program cannot be started; the errors of [`Worker::listen`] and of `keep`;
+    /// # Errors
+    /// The program cannot be started; the errors of [`Worker::listen`] and of `keep`;
     /// [`interrupt::Interrupted`].
     pub fn see_through(
         &self,
@@ -305,7 +309,8 @@ impl Workers {
 
     /// Runs a job; returns what `pick` selects from its messages.
     ///
-    /// # Errors The errors of [`Workers::see_through`].
+    /// # Errors
+    /// The errors of [`Workers::see_through`].
     pub fn found<T>(
         &self,
         process: u32,

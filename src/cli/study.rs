@@ -136,7 +136,8 @@ pub struct Study {
 impl Study {
     /// A study of `before` steps, followed by the processes that time.
     ///
-    /// # Errors The errors of [`Workers::new`]; an argument that is not text.
+    /// # Errors
+    /// The errors of [`Workers::new`]; an argument that is not text.
     pub fn new(about: String, before: u64, spread: &SpreadArgs) -> anyhow::Result<Study> {
         let processes = spread.processes;
         let bar = progress(before + u64::from(processes), "");

@@ -141,7 +141,8 @@ impl Culling {
     /// The same view serves every structure. O(m^3) for the m planes of the lens, a few
     /// microseconds for `exact`.
     ///
-    /// # Errors Planes that do not fit f32; invalid combinations.
+    /// # Errors
+    /// Planes that do not fit f32; invalid combinations.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
         self.check()?;
         let local_eye = camera.frame.eye - around.origin;
@@ -174,7 +175,8 @@ impl Culling {
 
     /// Checks that the choices can be combined.
     ///
-    /// # Errors Names the conflicting choices.
+    /// # Errors
+    /// Names the conflicting choices.
     pub fn check(&self) -> Result<(), CullingError> {
         if self.arithmetic != Arithmetic::F32 {
             if self.planes.method != PlaneMethod::Frame {

@@ -136,7 +136,8 @@ impl ConvexVolume {
 
     /// A volume of planes, some of which have a name.
     ///
-    /// # Errors The errors of [`ConvexVolume::from_planes`].
+    /// # Errors
+    /// The errors of [`ConvexVolume::from_planes`].
     pub fn from_labelled_planes(
         planes: &[(Option<FrustumPlane>, Plane)],
     ) -> Result<Self, VolumeError> {
@@ -220,7 +221,8 @@ pub struct ConvexVolumeF64 {
 impl ConvexVolumeF64 {
     /// The volume on the inner side of all planes; all of space without planes.
     ///
-    /// # Errors More than 32 planes, or a plane with a NaN or infinite number.
+    /// # Errors
+    /// More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {
         VolumeError::check_count(planes.len())?;
         for (index, plane) in planes.iter().enumerate() {

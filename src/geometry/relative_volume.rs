@@ -37,7 +37,8 @@ impl RelativeVolume {
     ///
     /// The offsets become `n . eye + d`, computed in f64 and rounded once.
     ///
-    /// # Errors An eye or an offset beyond f32.
+    /// # Errors
+    /// An eye or an offset beyond f32.
     pub fn about(eye: Vec3, volume: &ConvexVolume) -> Result<Self, VolumeError> {
         let moved = volume.planes().iter().map(PlaneF64::from);
         let moved = moved.map(|plane| plane.about(eye.as_dvec3()).narrow());

@@ -178,7 +178,8 @@ pub trait BoxTested: Sized + Send + Sync {
 
     /// Builds it over all items that are not empty.
     ///
-    /// # Errors If it cannot hold the items.
+    /// # Errors
+    /// If it cannot hold the items.
     fn of(items: Vec<Record>, params: &Self::Params) -> Result<Self, BuildError>;
 
     /// Its [`RegionIndex::refit`]; `None` if a rebuild is needed.

@@ -181,8 +181,8 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Deterministic: the same items and parameters give the same structure for any number of
     /// threads.
     ///
-    /// # Errors An item with a NaN or infinite bound (named), more items than ids, parameters out
-    /// of range.
+    /// # Errors
+    /// An item with a NaN or infinite bound (named), more items than ids, parameters out of range.
     fn build(input: &Input<'_>, params: &Self::Params) -> Result<Self, BuildError>;
 
     /// Heap bytes.

@@ -165,8 +165,8 @@ impl Registry {
 
     /// Adds a structure.
     ///
-    /// # Panics If that name is taken or cannot be typed: a programming error, which the message
-    /// names.
+    /// # Panics
+    /// If that name is taken or cannot be typed: a programming error, which the message names.
     pub fn with<T: RegionIndex + 'static>(self) -> Registry {
         self.with_row(Row::of::<T>())
     }
@@ -255,7 +255,8 @@ impl Registry {
     /// `all` are all of them, `motion` those that are not [on request](Info::on_request), and
     /// `default` those of `motion` that are not only [for motion](Info::for_motion).
     ///
-    /// # Errors The errors of [`Registry::structure`]; an empty list, a structure named twice.
+    /// # Errors
+    /// The errors of [`Registry::structure`]; an empty list, a structure named twice.
     pub fn structures(&self, list: &str) -> Result<Vec<StructureSpec>, SpecError> {
         let mut chosen: Vec<StructureSpec> = Vec::new();
         for text in Spec::split_list(list) {
@@ -304,7 +305,8 @@ impl StructureSpec {
     ///
     /// [`Registry::structure`] finds those of other registries.
     ///
-    /// # Errors The errors of [`Registry::structure`].
+    /// # Errors
+    /// The errors of [`Registry::structure`].
     pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
         Registry::builtin().structure(text)
     }
@@ -359,9 +361,10 @@ impl StructureSpec {
     /// Refits if the structure can, else rebuilds. The number of items must be that of the build;
     /// another number needs [`StructureSpec::build`].
     ///
-    /// # Errors A moved item with a NaN or infinite bound, or an id out of range: the index is
-    /// unchanged. The errors of [`StructureSpec::build`], and a refit that panics: the index is
-    /// unreliable until it is rebuilt.
+    /// # Errors
+    /// A moved item with a NaN or infinite bound, or an id out of range: the index is unchanged.
+    /// The errors of [`StructureSpec::build`], and a refit that panics: the index is unreliable
+    /// until it is rebuilt.
     pub fn update(
         &self,
         index: &mut Box<dyn DynIndex>,

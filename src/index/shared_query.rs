@@ -12,7 +12,8 @@ use crate::threads::{MOST_THREADS, Workers};
 
 /// The threads of a structure's queries; `None` for a single thread.
 ///
-/// # Errors A number out of range, or threads that the system cannot create.
+/// # Errors
+/// A number out of range, or threads that the system cannot create.
 pub fn workers(threads: usize, structure: &'static str) -> Result<Option<Workers>, BuildError> {
     let most = MOST_THREADS as f64;
     check_range(structure, "threads", threads as f64, 1.0, most)?;

@@ -44,7 +44,8 @@ pub trait Isa: Copy + Send + Sync {
     ///
     /// A place without a successor yields the last two numbers of the table.
     ///
-    /// # Panics If the table has fewer than two.
+    /// # Panics
+    /// If the table has fewer than two.
     fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [Self::Floats; 2];
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
@@ -128,7 +129,8 @@ pub trait Pack<'a, I: Isa> {
 
     /// Appends the words of `lanes`, lowest first.
     ///
-    /// # Panics If there is no room for another row.
+    /// # Panics
+    /// If there is no room for another row.
     fn push(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask);
 }
 

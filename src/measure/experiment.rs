@@ -161,7 +161,8 @@ impl Plan {
     ///
     /// A refusal if only another test of the plan has a view of every camera.
     ///
-    /// # Errors No culling test of the plan has a view of every camera.
+    /// # Errors
+    /// No culling test of the plan has a view of every camera.
     pub fn workload<'s>(
         &self,
         scene: &'s Scene,
@@ -191,7 +192,8 @@ impl Plan {
     ///
     /// Structures, cache states, motions and tests of a pair stay together.
     ///
-    /// # Panics If `n` is zero.
+    /// # Panics
+    /// If `n` is zero.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
         let mut pair = 0;
         for scene in &mut self.scenes {
@@ -293,7 +295,8 @@ impl Share {
 /// Builds the structures, then measures group after group. `keep` gets each part as soon as its
 /// group is finished.
 ///
-/// # Errors A scene or a path that cannot be read or made, a camera without a view.
+/// # Errors
+/// A scene or a path that cannot be read or made, a camera without a view.
 pub fn measure_scene(
     plan: &Plan,
     planned: &PlannedScene,
@@ -312,7 +315,8 @@ pub type PathOf<'a> = &'a dyn Fn(&str, Option<f64>) -> Result<CameraPath, InputE
 
 /// Measures one process's share of a loaded scene, like [`measure_scene`].
 ///
-/// # Errors A path that cannot be read or made, a camera without a view.
+/// # Errors
+/// A path that cannot be read or made, a camera without a view.
 pub fn measure_loaded(
     plan: &Plan,
     planned: &PlannedScene,

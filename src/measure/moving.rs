@@ -262,7 +262,8 @@ pub(super) fn replay(
 
 /// ln of (query time / query time on a fresh build of the same boxes), by frame.
 ///
-/// # Errors An answer that differs from the reference scan's.
+/// # Errors
+/// An answer that differs from the reference scan's.
 pub(super) fn ageing(
     spec: &StructureSpec,
     frames: &Frames,

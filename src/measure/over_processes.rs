@@ -49,7 +49,8 @@ pub struct OverProcesses<K = usize> {
 impl OverProcesses {
     /// The times of tasks by their indices in the schedule.
     ///
-    /// # Panics If the processes have not timed the same tasks.
+    /// # Panics
+    /// If the processes have not timed the same tasks.
     pub fn of(processes: &[ProcessTimes]) -> OverProcesses {
         let tasks = processes.first().map_or(0, |first| first.ln_ns.len());
         OverProcesses::keyed((0..tasks).collect(), processes)

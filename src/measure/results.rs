@@ -36,7 +36,8 @@ pub struct Group {
 impl Group {
     /// Cells of a group from its parts, one per process, the first process first.
     ///
-    /// # Panics Without parts.
+    /// # Panics
+    /// Without parts.
     pub fn of(parts: &[Part]) -> Group {
         let merged = MergedParts::of(parts);
         let first = &parts[0];

@@ -74,7 +74,8 @@ impl Timed {
 /// `turn` gets the index of a task before each of its turns. A sample with another number of ids
 /// than [`TimedTask::expected`] makes its task `wrong`; a panic fails only its own task.
 ///
-/// # Panics If the schedule has another number of tasks.
+/// # Panics
+/// If the schedule has another number of tasks.
 pub fn timed(
     tasks: &[TimedTask],
     schedule: &Schedule,

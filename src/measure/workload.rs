@@ -69,8 +69,9 @@ pub struct WorkloadError {
 impl<'a> Workload<'a> {
     /// Makes the queries of all cameras of a path.
     ///
-    /// # Errors A camera whose view cannot be made (its planes do not fit f32, or the choices
-    /// conflict); its place in the path is named.
+    /// # Errors
+    /// A camera whose view cannot be made (its planes do not fit f32, or the choices conflict); its
+    /// place in the path is named.
     pub fn new(
         scene: &'a Scene,
         path: &CameraPath,
@@ -83,7 +84,8 @@ impl<'a> Workload<'a> {
     ///
     /// Recorded moves follow the times of recorded cameras ([`Motion::seen_by`]).
     ///
-    /// # Errors The errors of [`Workload::new`].
+    /// # Errors
+    /// The errors of [`Workload::new`].
     pub fn moving(
         scene: &'a Scene,
         path: &CameraPath,

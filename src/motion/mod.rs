@@ -94,7 +94,8 @@ impl Motion {
     ///
     /// An existing file takes precedence over a name.
     ///
-    /// # Errors One line that names what was found and what was expected.
+    /// # Errors
+    /// One line that names what was found and what was expected.
     pub fn load(source: &str, scene: &Scene) -> Result<Motion, InputError> {
         let items = scene.items.len();
         let motion = |frames, from| Motion {

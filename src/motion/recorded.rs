@@ -122,8 +122,9 @@ impl Recorded {
 /// Rows with the same time are a frame; a row without bounds removes the item. Numbers are f64 and
 /// are rounded outward to f32 relative to the scene's origin.
 ///
-/// # Errors The line of the first value that is not a number, box or item of the scene; a time
-/// before the last one; an item twice at one time; a file without rows.
+/// # Errors
+/// The line of the first value that is not a number, box or item of the scene; a time before the
+/// last one; an item twice at one time; a file without rows.
 pub(super) fn read_motion_csv(
     bytes: &[u8],
     file: &str,

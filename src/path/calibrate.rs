@@ -37,8 +37,9 @@ const MOST_APART: f64 = 1.2;
 ///
 /// Within the sample's accuracy. A near that is a thousandth of far is scaled too.
 ///
-/// # Errors A share not reached even at four times the present far plane, or smaller than any share
-/// that can be reached.
+/// # Errors
+/// A share not reached even at four times the present far plane, or smaller than any share that can
+/// be reached.
 pub(super) fn for_visible_share(
     path: &str,
     scene: &Scene,

@@ -60,7 +60,8 @@ impl CameraPath {
     ///
     /// A known `scale` is used instead of a search.
     ///
-    /// # Errors A share that no scale reaches.
+    /// # Errors
+    /// A share that no scale reaches.
     pub fn seeing(mut self, scene: &Scene, share: f64, scale: Option<f64>) -> Result<CameraPath> {
         let find = || calibrate::for_visible_share(&self.name, scene, &self.cameras, share);
         let scale = scale.map_or_else(find, Ok)?;
@@ -256,7 +257,8 @@ impl Scene {
 ///
 /// An existing file takes precedence over a name.
 ///
-/// # Errors One line that names what was found and what was expected.
+/// # Errors
+/// One line that names what was found and what was expected.
 pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath> {
     load_scaled(source, scene, defaults, None)
 }
@@ -266,7 +268,8 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
 /// The scale that an earlier load of this path has found ([`CameraPath::lens_scale`]); no new
 /// search.
 ///
-/// # Errors The errors of [`load`].
+/// # Errors
+/// The errors of [`load`].
 pub fn load_scaled(
     source: &str,
     scene: &Scene,

@@ -86,9 +86,10 @@ const FAR_IN_NEARS: f64 = 1000.0;
 /// and none of the others. Times in `time_s` must ascend; an empty one is unknown. Columns in any
 /// order; a note names unread ones, except labels such as `name`.
 ///
-/// # Errors The line of the first value that is not a number or gives no valid camera, or of a time
-/// before the last one; a file without cameras; matrices without a convention, or with an eye or a
-/// lens; both a place to look at and a direction.
+/// # Errors
+/// The line of the first value that is not a number or gives no valid camera, or of a time before
+/// the last one; a file without cameras; matrices without a convention, or with an eye or a lens;
+/// both a place to look at and a direction.
 pub fn read_cameras_csv(bytes: &[u8], file: &str, defaults: &LensDefaults) -> Result<CameraPath> {
     let mut table = TableReader::open(bytes, file, &[&MATRIX_ENTRIES[..], &OF_EYES].concat())?;
     // With a convention also for other names, such as `_11`: the error is then about matrices.
@@ -285,7 +286,8 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
 
 /// Reads a points CSV with the columns `x,y,z`.
 ///
-/// # Errors The line of the first value that is not a finite number; a file without points.
+/// # Errors
+/// The line of the first value that is not a finite number; a file without points.
 pub fn read_points_csv(bytes: &[u8], file: &str) -> Result<Vec<DVec3>> {
     let mut table = TableReader::open(bytes, file, &["x", "y", "z"])?;
     let columns = table.columns(&["x", "y", "z"])?;

@@ -48,7 +48,8 @@ impl Located {
     ///
     /// In the order of [`query`](crate::index::RegionIndex::query).
     ///
-    /// # Panics If `point` is not below [`Located::len`].
+    /// # Panics
+    /// If `point` is not below [`Located::len`].
     pub fn of(&self, point: usize) -> &[ItemId] {
         let first = point.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.ids[first..self.ends[point]]

@@ -112,8 +112,9 @@ impl Experiment {
 
     /// Loads, builds, checks every answer, and times.
     ///
-    /// # Errors A scene or a path that cannot be read or made, a camera without a view; a plan that
-    /// measures nothing, or that a single process cannot measure.
+    /// # Errors
+    /// A scene or a path that cannot be read or made, a camera without a view; a plan that measures
+    /// nothing, or that a single process cannot measure.
     pub fn run(&self) -> Result<Report, ExperimentError> {
         self.check()?;
         let started_at = utc(SystemTime::now());

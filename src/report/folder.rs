@@ -35,7 +35,8 @@ pub struct RunFolder {
 impl RunFolder {
     /// Creates the folder of a new run.
     ///
-    /// # Errors The folder contains a file of a run already.
+    /// # Errors
+    /// The folder contains a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, InputError> {
         let io = writing::io(path);
         let is_new = !path.exists();
@@ -83,7 +84,8 @@ impl RunFolder {
 
     /// Appends a line, whole or not at all as far as a reader can tell.
     ///
-    /// # Errors I/O errors.
+    /// # Errors
+    /// I/O errors.
     pub fn append(&mut self, line: Line) -> Result<(), InputError> {
         let written = line.to_json().and_then(|text| self.stream.write_all(&text));
         written.map_err(writing::io(&self.path.join(STREAM)))
@@ -155,7 +157,8 @@ impl StoppedRun {
     ///
     /// An incomplete last line is ignored, and parts whose samples are missing are measured again.
     ///
-    /// # Errors No stream, not a stream, another schema version, or another process writing there.
+    /// # Errors
+    /// No stream, not a stream, another schema version, or another process writing there.
     pub fn open(path: &Path) -> Result<(StoppedRun, Stream), InputError> {
         let file = path.join(STREAM);
         let io = writing::io(&file);
@@ -196,7 +199,8 @@ impl StoppedRun {
 
     /// Truncates stream and samples to their complete part, to append to them.
     ///
-    /// # Errors I/O errors.
+    /// # Errors
+    /// I/O errors.
     pub fn go_on(self, stream: &Stream) -> Result<RunFolder, InputError> {
         let mut folder = RunFolder {
             samples: open(&self.path.join(SAMPLES))?,
@@ -217,7 +221,8 @@ impl StoppedRun {
 
 /// Refuses a folder that contains a file of a run.
 ///
-/// # Errors An error that names the folder.
+/// # Errors
+/// An error that names the folder.
 pub(super) fn refuse_taken(path: &Path) -> Result<(), InputError> {
     let files = [REPORT, SUMMARY, SAMPLES, STREAM, PAGE];
     // A dangling link counts too.
@@ -263,7 +268,8 @@ pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
 ///
 /// A picture is its name without `.svg`, and its contents.
 ///
-/// # Errors I/O errors.
+/// # Errors
+/// I/O errors.
 pub fn save_page(
     folder: &Path,
     page: &str,

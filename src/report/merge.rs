@@ -28,8 +28,9 @@ pub struct Merged {
 /// `line` has the options that the shards have in common, and their joint command; the caller
 /// compares them.
 ///
-/// # Errors No shard or an unfinished one; another seed, suite, structure, machine, build or
-/// source; a cell in two shards, a group in none.
+/// # Errors
+/// No shard or an unfinished one; another seed, suite, structure, machine, build or source; a cell
+/// in two shards, a group in none.
 pub fn merge(folders: &[PathBuf], line: (&[String], &str)) -> Result<Merged, InputError> {
     let mut shards = Vec::new();
     for path in folders {
@@ -111,8 +112,9 @@ impl Merged {
     /// They are written to a temporary folder and renamed, in an empty folder the stream last, so
     /// that an interruption leaves no partial run.
     ///
-    /// # Errors A folder that contains a run or other files; errors of the file system and of
-    /// `check`, which is called before every long step.
+    /// # Errors
+    /// A folder that contains a run or other files; errors of the file system and of `check`, which
+    /// is called before every long step.
     pub fn write(&self, out: &Path, check: &dyn Fn() -> io::Result<()>) -> Result<(), InputError> {
         let io = writing::io(out);
         folder::refuse_taken(out)?;

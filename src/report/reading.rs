@@ -23,7 +23,8 @@ use crate::statistics::median;
 ///
 /// Unknown fields are ignored.
 ///
-/// # Errors I/O errors, a file that is not a report, or another schema version.
+/// # Errors
+/// I/O errors, a file that is not a report, or another schema version.
 pub fn read_report(path: &Path) -> Result<Report, InputError> {
     if !path.is_dir() {
         return read_json(path.to_owned());
@@ -65,8 +66,8 @@ fn read_json(path: PathBuf) -> Result<Report, InputError> {
 ///
 /// The ends of the header and of each part, then the end of the last complete line.
 ///
-/// # Errors I/O errors; a line that is invalid or out of place (by its number); another schema
-/// version.
+/// # Errors
+/// I/O errors; a line that is invalid or out of place (by its number); another schema version.
 pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
     /// Read first: the kind of the line.
     #[derive(Deserialize)]

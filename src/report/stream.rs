@@ -65,7 +65,8 @@ pub struct Header {
 impl Line<'_> {
     /// The line as JSON, with its newline.
     ///
-    /// # Errors None are expected: it consists of text, numbers and maps with text keys.
+    /// # Errors
+    /// None are expected: it consists of text, numbers and maps with text keys.
     pub fn to_json(&self) -> io::Result<Vec<u8>> {
         let mut text = serde_json::to_vec(self)?;
         text.push(b'\n');

@@ -23,7 +23,8 @@ const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 /// A link is kept, and its target is replaced; an existing file keeps its permissions. A terminal,
 /// a pipe or a device is written to and never replaced.
 ///
-/// # Errors I/O errors, with the path.
+/// # Errors
+/// I/O errors, with the path.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -89,7 +90,8 @@ pub fn folder_of(file: &Path) -> &Path {
 ///
 /// Detects a read-only or full folder before the work.
 ///
-/// # Errors I/O errors, with the path.
+/// # Errors
+/// I/O errors, with the path.
 pub fn try_place(path: &Path) -> Result<(), InputError> {
     // A pipe or a device has no folder; opening a pipe would wait for its reader.
     let target = target(path).map_err(io(path))?;
@@ -99,7 +101,8 @@ pub fn try_place(path: &Path) -> Result<(), InputError> {
 
 /// [`try_place`] for a folder that exists or will be created.
 ///
-/// # Errors I/O errors, with the path.
+/// # Errors
+/// I/O errors, with the path.
 pub fn try_folder(path: &Path) -> Result<(), InputError> {
     let folder = path.ancestors().find(|folder| folder.exists());
     try_writing(folder.unwrap_or(Path::new("."))).map_err(io(path))
@@ -112,7 +115,8 @@ fn try_writing(folder: &Path) -> io::Result<()> {
 
 /// Creates a file removed at the end of this process or the next write beside it.
 ///
-/// # Errors I/O errors.
+/// # Errors
+/// I/O errors.
 pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     Ok(locked_temporary_in(folder)?.0)
 }

@@ -22,7 +22,8 @@ const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"]
 /// With `skip_bad_items`, rows that are not a finite box with min <= max are left out and counted
 /// in [`Scene::skipped_items`]; the others keep the ids of their rows ([`Scene::row_of`]).
 ///
-/// # Errors A missing or wrong header; the first bad row, with the number of bad rows.
+/// # Errors
+/// A missing or wrong header; the first bad row, with the number of bad rows.
 pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<Scene> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let mut rows = read_rows(&mut table, f64::from(f32::MAX))?;
@@ -47,7 +48,8 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
 
 /// Reads boxes to search by, in the same format: any f64 numbers.
 ///
-/// # Errors A missing or wrong header, or the first bad row.
+/// # Errors
+/// A missing or wrong header, or the first bad row.
 pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let mut rows = read_rows(&mut table, f64::MAX)?;

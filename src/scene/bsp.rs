@@ -137,8 +137,8 @@ impl BspTree {
     ///
     /// Points outside it have no leaf. O(nodes * depth).
     ///
-    /// # Errors A node or leaf that is reached twice or does not exist: the nodes do not form a
-    /// tree.
+    /// # Errors
+    /// A node or leaf that is reached twice or does not exist: the nodes do not form a tree.
     pub fn new(
         nodes: Vec<BspNode>,
         root: BspChild,

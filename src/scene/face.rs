@@ -21,7 +21,8 @@ const MOST_WRONG: f64 = 1e-4;
 /// bounds of the face. O(corners); for a concave face up to quadratic. One of more than
 /// [`MOST_CONCAVE`] corners becomes a fan if the fan does not overlap except by rounding.
 ///
-/// # Errors The words "a concave face of N corners", N above [`MOST_CONCAVE`].
+/// # Errors
+/// The words "a concave face of N corners", N above [`MOST_CONCAVE`].
 pub fn add_triangles(points: &[DVec3], face: &[u32], to: &mut Vec<[u32; 3]>) -> Result<(), String> {
     let flat = flat_if_concave(points, face);
     let flat = flat.filter(|flat| face.len() <= MOST_CONCAVE || !is_fan(flat));

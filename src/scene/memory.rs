@@ -40,7 +40,8 @@ impl LoadOptions {
     ///
     /// The number of items is estimated from the triangles if it is unknown.
     ///
-    /// # Errors The sizes needed and free.
+    /// # Errors
+    /// The sizes needed and free.
     pub fn check_fits(&self, scene: &str, items: Option<u64>, triangles: u64) -> Result<()> {
         let made = needed_by_items(items.unwrap_or(triangles / FEWEST), self.structures);
         let needed = made.saturating_add(triangles.saturating_mul(MESHED + self.per_triangle));
@@ -53,7 +54,8 @@ impl LoadOptions {
 ///
 /// A scene of few items or triangles (`count`) passes, and any scene if the free memory is unknown.
 ///
-/// # Errors The sizes needed and free.
+/// # Errors
+/// The sizes needed and free.
 pub fn check_fits(scene: &str, needed: u64, structures: u64, count: u64) -> Result<()> {
     let available = (count > ANYWHERE).then(available_bytes).flatten();
     fits(scene, needed, structures, available)

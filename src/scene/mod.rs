@@ -269,7 +269,8 @@ impl Scene {
 
     /// Rounds the boxes outward relative to an origin chosen for them.
     ///
-    /// # Errors The first box that is not finite, inverted or too large for f32.
+    /// # Errors
+    /// The first box that is not finite, inverted or too large for f32.
     pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene> {
         let origin = choose_origin(boxes.iter().copied());
         Scene::about(name, boxes, origin)

@@ -44,8 +44,9 @@ pub fn is_obj(bytes: &[u8]) -> bool {
 
 /// Reads a scene; y is up unless the options say otherwise.
 ///
-/// # Errors The first line with invalid numbers or a missing vertex; a file without faces; a scene
-/// that does not fit into memory or into f32.
+/// # Errors
+/// The first line with invalid numbers or a missing vertex; a file without faces; a scene that does
+/// not fit into memory or into f32.
 pub fn read_obj(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let size = bytes.len() as u64;
     let needed = size.saturating_mul(BYTES_PER_BYTE);

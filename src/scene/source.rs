@@ -40,7 +40,8 @@ pub fn split_part(source: &str) -> (&str, Option<&str>) {
 
 /// The scenes of `maps.wad#*` or `pak.pk3#*`, one by one; else the source itself.
 ///
-/// # Errors A file that cannot be read, or a damaged directory.
+/// # Errors
+/// A file that cannot be read, or a damaged directory.
 pub fn every_part(source: &str) -> Result<Vec<String>> {
     let (file, part) = split_part(source);
     let names = match part {
@@ -62,7 +63,8 @@ fn is_archive(bytes: &[u8], file: &str) -> bool {
 
 /// Names of the maps of a WAD or the scenes of a zip archive; empty for others.
 ///
-/// # Errors A damaged directory.
+/// # Errors
+/// A damaged directory.
 pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
     match (is_wad(bytes), is_archive(bytes, file)) {
         (true, _) => map_names(bytes, file),
@@ -76,7 +78,8 @@ pub fn part_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 /// `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`, `map.wad`,
 /// `maps.wad#MAP07` or `pak.pk3#maps/q.bsp`. An existing file takes precedence over a name.
 ///
-/// # Errors One line that names what was found and what was expected.
+/// # Errors
+/// One line that names what was found and what was expected.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     let mut scene = read(source, options)?;
     if options.items == ItemKind::Triangles {
@@ -152,7 +155,8 @@ fn read(source: &str, options: &LoadOptions) -> Result<Scene> {
 ///
 /// Nothing is loaded.
 ///
-/// # Errors A scene that would not fit.
+/// # Errors
+/// A scene that would not fit.
 pub fn check_fits(source: &str, options: &LoadOptions) -> Result<()> {
     let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
         return Ok(());
@@ -180,7 +184,8 @@ impl Family {
 ///
 /// `name` becomes the scene's name.
 ///
-/// # Errors The errors of [`load`].
+/// # Errors
+/// The errors of [`load`].
 pub fn read_bytes(
     bytes: &[u8],
     names: [&str; 2],
@@ -271,7 +276,8 @@ pub fn is_wad(bytes: &[u8]) -> bool {
 impl Sample {
     /// Loads the scene of the sample.
     ///
-    /// # Errors The file cannot be read; no sample of this build has that error.
+    /// # Errors
+    /// The file cannot be read; no sample of this build has that error.
     pub fn load(&self) -> Result<Scene> {
         let names = [self.file, self.name];
         Ok(Scene {
@@ -316,7 +322,8 @@ const FORMATS: [(&str, &[&[u8]], &str, &str); 22] = [
 
 /// Refuses known formats that are not read.
 ///
-/// # Errors The name of the format, and what to give instead.
+/// # Errors
+/// The name of the format, and what to give instead.
 pub fn refuse(bytes: &[u8], file: &str) -> Result<()> {
     let extension = Path::new(file).extension().unwrap_or_default();
     let extension = extension.to_string_lossy().to_ascii_uppercase();

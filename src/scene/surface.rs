@@ -101,7 +101,8 @@ impl Surfaces {
     /// Only the one-sided ones if all together are not closed. Points at one position are merged:
     /// files have several, one for each normal.
     ///
-    /// # Panics If there is no such item.
+    /// # Panics
+    /// If there is no such item.
     pub fn solid_part(&self, item: usize) -> Surfaces {
         let opaque = self.range(item);
         let opaque = opaque.filter(|&at| self.kinds[at] == SurfaceKind::Opaque);
@@ -241,7 +242,8 @@ impl Surfaces {
     ///
     /// Its items are the smallest f32 boxes that contain the triangles of each item as written.
     ///
-    /// # Errors An item without triangles, which has no box.
+    /// # Errors
+    /// An item without triangles, which has no box.
     pub fn into_scene(self, name: impl Into<String>) -> Result<Scene> {
         let boxes: Vec<_> = self.of_item.iter().map(|t| self.world_box(t)).collect();
         let scene = Scene::about(name, &boxes, self.origin)?;
@@ -288,7 +290,8 @@ impl Scene {
 
     /// The same triangles, one item each, with the labels of their items.
     ///
-    /// # Errors A scene without triangles, or one that does not fit into memory.
+    /// # Errors
+    /// A scene without triangles, or one that does not fit into memory.
     pub fn by_triangle(self, options: &LoadOptions) -> Result<Scene> {
         let Some(surfaces) = &self.surfaces else {
             return Err(SpecError::new(format_args!(

@@ -65,7 +65,8 @@ pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 impl WadMap {
     /// Decodes one map: the named one, or the only one.
     ///
-    /// # Errors The first error in the file, by its byte.
+    /// # Errors
+    /// The first error in the file, by its byte.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap> {
         let wad = Wad::open(bytes, file)?;
         let [things, linedefs, sides, vertices, rest @ ..] = wad.tables(map)?;

@@ -207,7 +207,8 @@ impl Scene {
     /// Almost always the stored items are identical too. If the reader chooses another origin (a
     /// map whose origin is far away), they are rounded relative to that.
     ///
-    /// # Errors An item beyond the range of the reader: f32 in world coordinates.
+    /// # Errors
+    /// An item beyond the range of the reader: f32 in world coordinates.
     pub fn settled(self) -> Result<Scene> {
         let most = f64::from(f32::MAX);
         let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();

@@ -35,8 +35,9 @@ pub fn scene_names(bytes: &[u8], file: &str) -> Result<Vec<String>> {
 
 /// The unpacked bytes of an entry.
 ///
-/// # Errors An encrypted entry, another compression method, too little memory, or bytes that differ
-/// from the directory.
+/// # Errors
+/// An encrypted entry, another compression method, too little memory, or bytes that differ from the
+/// directory.
 pub fn unpacked(
     archive: &Archive,
     file: &str,
@@ -148,7 +149,8 @@ fn ends_in(name: &str, endings: &[&str]) -> bool {
 ///
 /// Also the map in it, if one is named, as in `maps.wad#MAP07`.
 ///
-/// # Errors No such entry, or several.
+/// # Errors
+/// No such entry, or several.
 pub fn chosen<'e, 'r, 'w>(
     entries: &'e [Named<'r>],
     named: impl Fn(&str) -> Option<&'e Named<'r>>,

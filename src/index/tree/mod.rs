@@ -53,7 +53,8 @@ pub trait TreeBuilder: Send + Sync {
     /// A tree with normals is binary: a plane with the normal of an inner node divides its items,
     /// those on the back first.
     ///
-    /// # Errors The errors of [`RegionIndex::build`].
+    /// # Errors
+    /// The errors of [`RegionIndex::build`].
     fn build(input: &Input<'_>, params: &Self::Params) -> Built;
 }
 

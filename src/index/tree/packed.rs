@@ -39,7 +39,8 @@ impl PackedTree {
     /// either [pushes](PackedTree::push) the items of a leaf or lists the groups of the children,
     /// in order. Iterative, so that a degenerate tree cannot overflow the stack.
     ///
-    /// # Panics If a node has more than sixteen children.
+    /// # Panics
+    /// If a node has more than sixteen children.
     pub fn grow<G>(
         items: usize,
         root: G,

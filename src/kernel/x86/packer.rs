@@ -8,8 +8,8 @@ use crate::kernel::isa::{Isa, LANES, LaneMask, Pack};
 
 /// Instructions that compress words into memory that may be uninitialised.
 ///
-/// # Safety [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the sixteenth
-/// place.
+/// # Safety
+/// [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the sixteenth place.
 pub unsafe trait PackTo: Isa {
     /// Moves the words of `lanes` together, lowest first, to `place`.
     ///

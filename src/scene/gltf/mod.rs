@@ -43,9 +43,9 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
 
 /// Reads a scene; `beside` reads the files that it refers to.
 ///
-/// # Errors The first value that glTF 2.0 does not allow, by its place in the file; a node that is
-/// reached twice; a mesh without triangles and without bounds; a scene that does not fit into
-/// memory.
+/// # Errors
+/// The first value that glTF 2.0 does not allow, by its place in the file; a node that is reached
+/// twice; a mesh without triangles and without bounds; a scene that does not fit into memory.
 pub(super) fn read_beside(
     bytes: &[u8],
     [file, name]: [&str; 2],

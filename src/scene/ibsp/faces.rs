@@ -54,7 +54,8 @@ pub fn patch(points: &[Vec3], width: usize) -> Faces {
 
 /// The box of a brush: its first six sides.
 ///
-/// # Errors Sides that are not those of a box.
+/// # Errors
+/// Sides that are not those of a box.
 pub fn brush_box(brushes: &Table, brush: usize, sides: &[(Vec3, f32)]) -> Result<Aabb> {
     let mut bounds = Aabb::EMPTY;
     for axis in 0..3 {

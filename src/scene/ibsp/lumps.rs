@@ -36,7 +36,8 @@ pub const OTHERS: [(&[u8], &str); 12] = [
 
 /// Finds the lump of a number.
 ///
-/// # Errors Another format, or a lump beyond the file or not a whole number of records long.
+/// # Errors
+/// Another format, or a lump beyond the file or not a whole number of records long.
 pub fn lump<'a>(bytes: &'a [u8], file: &'a str, number: usize) -> Result<Table<'a>> {
     let row = LUMPS.iter().find(|row| row.0 == number);
     let &(_, name, record) = row.expect("a lump that is read");

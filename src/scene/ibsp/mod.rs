@@ -109,7 +109,8 @@ fn kind_of(shaders: &Table, shader: usize, is_drawn: bool) -> SurfaceKind {
 
 /// Reads a map as a scene: surfaces first, then brushes, in the order of the file.
 ///
-/// # Errors The first value that the format does not allow, by its byte.
+/// # Errors
+/// The first value that the format does not allow, by its byte.
 pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) -> Result<Scene> {
     let mut map = QuakeMap::read(bytes, file)?;
     let lump = |number| lump(bytes, file, number);

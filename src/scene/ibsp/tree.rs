@@ -114,7 +114,8 @@ impl LeafTree {
 ///
 /// Those of a map's moving parts have no node.
 ///
-/// # Errors Nodes that do not form a tree, or form a very deep one.
+/// # Errors
+/// Nodes that do not form a tree, or form a very deep one.
 fn reached_leaves(nodes: &Table, leaves: &Table) -> Result<Vec<bool>> {
     let error = |node, at, found: String| Err(nodes.error(node, at, found, "a BSP tree"));
     if nodes.len() == 0 {
