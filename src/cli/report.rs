@@ -1,7 +1,7 @@
 //! `cullbench report`: the results of a run, from its report.json.
 //!
-//! Output is Markdown, pictures, one HTML page, or the Bencher Metric Format (bencher.dev). Also the
-//! summary on the terminal at the end of `run`, and the page of several runs, oldest first.
+//! Output is Markdown, pictures, one HTML page, or the Bencher Metric Format (bencher.dev). Also
+//! the summary on the terminal at the end of `run`, and the page of several runs, oldest first.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -50,8 +50,8 @@ pub(super) fn flythrough(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
 
 /// A closed centripetal Catmull-Rom spline at `at` (segment number plus fraction).
 ///
-/// Evaluated by the pyramid of Barry and Goldman 1988; without loops or cusps within a segment (Yuksel et al.
-/// 2011).
+/// Evaluated by the pyramid of Barry and Goldman 1988; without loops or cusps within a segment
+/// (Yuksel et al. 2011).
 fn spline(points: &[DVec3], at: f64) -> DVec3 {
     let n = points.len();
     let segment = at.floor();

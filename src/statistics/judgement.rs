@@ -28,8 +28,8 @@ const ALPHA: f64 = 0.025;
 
 /// Least change that counts as one: 1 %; a verdict proves a larger one.
 ///
-/// Two builds of the same code differ that much by where the linker puts it (Mytkowicz et al.
-/// 2009), and two processes by where their memory lies.
+/// Two builds of the same code differ that much by the linker's placement (Mytkowicz et al. 2009),
+/// and two processes by their memory layout.
 const FLOOR: f64 = 0.01;
 
 /// Quantile for the ends of the 95 % interval.

@@ -163,7 +163,7 @@ fn parameters_need_no_serde_default_and_may_have_no_names() {
     );
     assert!(specs.iter().all(|spec| spec.build(&[]).is_ok()));
     for (text, wanted) in [
-        // Without `deny_unknown_fields` serde passes over it.
+        // Without `deny_unknown_fields` serde ignores it.
         (
             "Plain:depth=5",
             "'Plain': a field 'depth'; expected level, scale",
@@ -245,7 +245,7 @@ fn names_that_cannot_be_typed_are_refused() {
     }
 }
 
-/// The hint names exactly what the feature brings.
+/// The hint names exactly the structures of the feature.
 #[test]
 fn the_names_of_the_peers_are_those_of_their_rows() {
     let own = 14;
