@@ -38,7 +38,7 @@ const GROWTH: f32 = 0.25;
 /// Most growth of a region for the centres of its movers, likewise.
 const REGION_GROWTH: f32 = 0.125;
 
-/// Leaves of movers / leaves added when all are in use; the cost is not noticeable.
+/// Leaves of movers / leaves added when all are in use: few, so no update is slow.
 const MORE: usize = 16;
 
 /// Leaves of movers from which on a region is crowded.
@@ -138,7 +138,7 @@ impl Moving {
         }
     }
 
-    /// Divides the still tree into regions of six to eleven of `movers` movers each.
+    /// Divides the still tree into regions of six to eleven movers, `movers` in all.
     ///
     /// The leaves of movers are in spatial order, with room for 8 or 32 times as many regions.
     fn divide(&mut self, movers: usize) {
@@ -413,7 +413,7 @@ impl RegionIndex for Moving {
 
     /// O(n log n), that of [`Wide`].
     fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
-        // Vacant lanes are not needed: the second tree takes items that appear.
+        // No reserved lanes: items that appear go to vacant lanes or to the second tree.
         let mut trees = Moving::resting(&input.come_and_go(false), params)?;
         trees.prepare(input.items.len());
         Ok(trees)
