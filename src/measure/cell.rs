@@ -51,7 +51,7 @@ pub struct ReportCell {
     /// Digest of the ids returned to all frustum queries; absent if wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answers: Option<String>,
-    /// Metrics that were not measured of an ok cell, each with its reason.
+    /// Metrics that were not measured in an ok cell, each with its reason.
     pub left_out: Vec<String>,
     /// Location of the samples of this cell; null without samples.
     pub samples_ref: Option<SamplesRef>,
