@@ -23,6 +23,7 @@ use crate::measure::{Status, Subject, Verdict, Workload, count_pass, guarded, ju
 use crate::path::{self, CameraPath};
 use crate::query::{ItemId, Located};
 use crate::report::grouped;
+use crate::scene::memory::{available_bytes, fits_into};
 use crate::scene::{FAMILIES, Regions, SAMPLES, Scene, every_part};
 use crate::verify::{
     ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
@@ -167,6 +168,10 @@ fn workloads<'a>(
     culling: &Culling,
     left_out: &mut Vec<String>,
 ) -> anyhow::Result<Vec<(String, Workload<'a>)>> {
+    // Bytes of a camera with all its kinds of volumes: 25,000 measured.
+    let needed = 26_000 * cameras.cameras.len() as u64;
+    let what = format!("all kinds of volumes of the cameras of '{}'", cameras.name);
+    fits_into(available_bytes(), [&what, "", "fewer cameras"], needed)?;
     let around = scene.surroundings();
     let first = format!("{} perspective", culling.arithmetic.name());
     let mut all = vec![(first, Workload::new(scene, cameras, culling)?)];

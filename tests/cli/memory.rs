@@ -47,6 +47,10 @@ fn a_scene_beyond_the_limits_of_the_process_is_one_line() {
     let wanted =
         "path 'orbit:frames=1000000', 1000000 cameras: needs about 3.0 GB, | expected a smaller";
     assert_refused(&limited(folder.path(), 500_000, line), wanted, line);
+    let line = "verify --scene uniform:n=5 --path orbit:frames=25000 --structure linear";
+    let wanted =
+        "volumes of the cameras of 'orbit:frames=25000': needs about 650 MB, | expected fewer";
+    assert_refused(&limited(folder.path(), 600_000, line), wanted, line);
 }
 
 #[test]

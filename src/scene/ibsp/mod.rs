@@ -241,7 +241,8 @@ fn faces_of(
 /// The places where players start, in their direction of view.
 fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     let (mut places, mut bad, mut moved) = (Vec::new(), 0, 0);
-    for words in entities_of(entities) {
+    let (entities, is_whole) = entities_of(entities);
+    for words in entities {
         let value = |key: &str| {
             let mut pairs = words.chunks_exact(2);
             let pair = pairs.find(|pair| pair[0].eq_ignore_ascii_case(key));
@@ -285,32 +286,42 @@ fn places(entities: &str, file: &str) -> Vec<CameraPlace> {
     }
     let bad = (bad, "spawn point", "without a place, left out");
     let what = "with an origin, where the file has it and not there";
-    note_counted(file, [bad, (moved, "part", what)]);
+    let open = (!is_whole).into();
+    let lost = "in the entities not closed: places may be missing";
+    let open = (open, "quote, comment or brace", lost);
+    note_counted(file, [bad, (moved, "part", what), open]);
     places
 }
 
-/// Keys and values of each entity, alternating.
-fn entities_of(mut text: &str) -> Vec<Vec<&str>> {
-    let (mut all, mut words) = (Vec::new(), Vec::new());
-    while let Some(at) = text.find(['"', '}', '/']) {
+/// Keys and values of each entity, alternating; false if something is not closed.
+fn entities_of(mut text: &str) -> (Vec<Vec<&str>>, bool) {
+    let (mut all, mut words, mut is_whole) = (Vec::new(), Vec::new(), true);
+    while let Some(at) = text.find(['"', '{', '}', '/']) {
         let rest = &text[at + 1..];
+        let mut split = |end| {
+            is_whole &= rest.contains(end);
+            rest.split_once(end).unwrap_or((rest, ""))
+        };
         text = match text.as_bytes()[at] {
             b'"' => {
-                let (word, rest) = rest.split_once('"').unwrap_or((rest, ""));
+                let (word, rest) = split("\"");
                 words.push(word);
                 rest
             }
             b'/' if rest.starts_with('/') => rest.trim_start_matches(|c| c != '\n'),
-            b'/' if rest.starts_with('*') => rest.split_once("*/").map_or("", |(_, rest)| rest),
-            b'}' => {
+            b'/' if rest.starts_with('*') => split("*/").1,
+            brace @ (b'{' | b'}') => {
+                // The brace before, or a quote, is not closed.
+                is_whole &= brace == b'}' && words.len().is_multiple_of(2) || words.is_empty();
                 all.push(std::mem::take(&mut words));
                 rest
             }
             _ => rest,
         };
     }
+    is_whole &= words.is_empty();
     all.push(words);
-    all
+    (all, is_whole)
 }
 
 #[cfg(test)]

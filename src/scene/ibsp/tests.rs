@@ -91,20 +91,29 @@ fn surfaces_or_brushes_alone_are_items_on_request() {
 fn entities_are_read_as_the_engine_reads_them() {
     let spawn = r#""classname" "info_player_deathmatch" "origin" "1 2 3""#;
     let of = |text: &str| places(text, "in.bsp").len();
-    for (text, count) in [
-        (format!("{{{spawn}}} {{{spawn}}}"), 2),
-        (format!(r#"{{"message" "}}" {spawn}}}"#), 1),
-        (format!(r#"{{"message" "//" {spawn}}}"#), 1),
-        (format!("// a \" and a {{\n{{{spawn}}}{{{spawn}}}"), 2),
+    for (text, count, is_whole) in [
+        (format!("{{{spawn}}} {{{spawn}}}"), 2, true),
+        (format!(r#"{{"message" "}}" {spawn}}}"#), 1, true),
+        (format!(r#"{{"message" "//" {spawn}}}"#), 1, true),
+        (format!("// a \" and a {{\n{{{spawn}}}{{{spawn}}}"), 2, true),
         (
             format!("{{{}}}", spawn.replace("classname", "ClassName")),
             1,
+            true,
         ),
-        (format!("/* {{{spawn}}} */{{{spawn}}}"), 1),
-        (format!("{{{spawn}"), 1),
-        ("\"".to_owned(), 0),
+        (format!("/* {{{spawn}}} */{{{spawn}}}"), 1, true),
+        (format!("{{{spawn}"), 1, false),
+        ("\"".to_owned(), 0, false),
+        (format!("/* {{{spawn}}}"), 0, false),
+        (format!(r#"{{"message" "hi}} {{{spawn}}}"#), 0, false),
+        (
+            format!(r#"{{"classname" "worldspawn" {{{spawn}}}"#),
+            1,
+            false,
+        ),
     ] {
         assert_eq!(of(&text), count, "{text}");
+        assert_eq!(entities_of(&text).1, is_whole, "{text}");
     }
 }
 
