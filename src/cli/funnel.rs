@@ -23,7 +23,7 @@ use super::{
     Ending, expect_folder, expect_places, funnel_table, print, text, write_if, write_text,
 };
 use crate::funnel::{
-    self, Chain, Fate, FunnelInput, FunnelReport, NONE, PickRow, StageKind, StageRow,
+    self, Chain, FunnelInput, FunnelReport, ItemOutcome, NONE, PickRow, StageKind, StageRow,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Setting};
@@ -262,12 +262,12 @@ const FATE_CLASSES: &[Class] = rows! { Class { colour, words, is_key }
 /// The picture as SVG.
 pub fn draw(report: &FunnelReport, scene: &Scene) -> String {
     let view = &report.plan_view;
-    let class_of = |item: usize| match view.fates.get(item) {
+    let class_of = |item: usize| match view.outcomes.get(item) {
         None => 0,
-        Some(Fate::Removed(stage)) => *stage as usize,
-        Some(Fate::Kept) => 3,
-        Some(Fate::Visible) => 4,
-        Some(Fate::Lost) => 5,
+        Some(ItemOutcome::Removed(stage)) => *stage as usize,
+        Some(ItemOutcome::Kept) => 3,
+        Some(ItemOutcome::Visible) => 4,
+        Some(ItemOutcome::Lost) => 5,
     };
     let (name, path) = (&report.scene, &report.path);
     let bad = Some(scene.skipped_items).filter(|bad| *bad > 0);

@@ -18,7 +18,7 @@ use super::text::{self, html};
 use super::{Ending, expect_places, load_scene, program, scene_facts, unread_is_fine, write_text};
 use crate::camera::{Camera, ClipSpace};
 use crate::culling::CameraView;
-use crate::funnel::{RaysEnd, Shape};
+use crate::funnel::{RayTargets, Shape};
 use crate::geometry::Aabb;
 use crate::index::{Registry, TreeCell, verdicts};
 use crate::input::{note, tell_warnings, warnings};
@@ -87,7 +87,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let threads = args.culling.kernel.execution()?.threads;
     let ends = args
         .samples
-        .map(|grid| (RaysEnd::at(&Shape::of(&scene), None), grid));
+        .map(|grid| (RayTargets::of(&Shape::of(&scene), None), grid));
     let downward = path::is_downward(&path::taken_apart(&cameras.cameras), scene.up);
     let (mut totals, mut frames) = ([0; KINDS], Vec::new());
     for (view, answer) in answers.iter().enumerate() {

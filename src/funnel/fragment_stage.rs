@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use super::error::fits_drawing;
 use super::item_stages::ItemStages;
+use super::setup::{Setup, Shape};
 use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z, default_test};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::truth::{Errors, Truth, count_items};
-use super::world::{Shape, World};
+use super::visible_items::{Errors, VisibleItems, count_items};
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
@@ -45,38 +45,41 @@ impl FragmentCounts {
 /// Boxes as they are; for a mesh or a map the triangles that the triangle stage leaves, plus floors
 /// and ceilings.
 pub struct FragmentStage<'w> {
-    world: &'w World<'w>,
-    left: Left<'w>,
+    setup: &'w Setup<'w>,
+    geometry: Geometry<'w>,
     /// Reason if nothing is drawn.
     pub too_much: Option<String>,
 }
 
 /// Geometry of each view, and the reused memory of an image.
-enum Left<'w> {
-    Boxes(Vec<Boxes>, RefCell<Option<(Canvas, Drawn)>>),
+enum Geometry<'w> {
+    Boxes(Vec<BoxView>, RefCell<Option<(Canvas, Drawn)>>),
     Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
 }
 
 type TriangleImage = RefCell<Option<(Canvas<Facet>, Drawn<Facet>)>>;
 
-impl Left<'_> {
+impl Geometry<'_> {
     /// Rejects a view that covers too many samples.
-    fn fits(&self, world: &World, view: usize) -> Result<(), String> {
-        let screen = Screen::of(world.rays(view), world.samples);
+    fn fits(&self, setup: &Setup, view: usize) -> Result<(), String> {
+        let screen = Screen::of(setup.rays(view), setup.samples);
         match self {
-            Left::Boxes(views, _) => {
+            Geometry::Boxes(views, _) => {
                 let boxes = views[view].bodies.iter();
                 let placed = boxes.filter_map(|body| screen.rectangle(&body.b));
-                fits_drawing(world.samples, placed)
+                fits_drawing(setup.samples, placed)
             }
-            Left::Triangles(surfaces, views, _) => {
+            Geometry::Triangles(surfaces, views, _) => {
                 let corners = views[view].iter().map(|&t| surfaces.corners(t));
                 let placed = corners.filter_map(|t| screen.triangle(t, surfaces.origin));
-                fits_drawing(world.samples, placed)
+                fits_drawing(setup.samples, placed)
             }
         }
     }
 }
+
+/// A test, its errors, and the counts of each drawn view.
+type TestResult = (BackEnd, Errors, Vec<Tally>);
 
 impl<'w> FragmentStage<'w> {
     /// Collects the remaining items, with triangles culled by the back end `triangle`.
@@ -84,39 +87,39 @@ impl<'w> FragmentStage<'w> {
         stages: &ItemStages<'w>,
         (triangles, triangle): (&TriangleStage, &str),
     ) -> FragmentStage<'w> {
-        let world = stages.world;
-        let left = match &world.shape {
+        let setup = stages.setup;
+        let geometry = match &setup.shape {
             Shape::Boxes(solids) => {
                 let of = |view| {
                     let listed = stages.listed(view);
                     let bodies: Vec<_> = SolidBox::some(&solids.boxes, &listed).collect();
-                    let room = Room::of(world, world.rays(view), &bodies);
-                    Boxes { bodies, room }
+                    let pass = PortalPass::of(setup, setup.rays(view), &bodies);
+                    BoxView { bodies, pass }
                 };
-                Left::Boxes(world.views().map(of).collect(), RefCell::new(None))
+                Geometry::Boxes(setup.views().map(of).collect(), RefCell::new(None))
             }
             Shape::Triangles(surfaces) => {
-                let beyond = surfaces.of_item.get(world.items()..).unwrap_or_default();
-                let triangles = world.views().map(|view| {
+                let beyond = surfaces.of_item.get(setup.items()..).unwrap_or_default();
+                let triangles = setup.views().map(|view| {
                     let mut triangles = triangles.triangles(triangle, view);
                     triangles.extend(beyond.iter().flat_map(Clone::clone));
                     triangles
                 });
-                Left::Triangles(surfaces, triangles.collect(), RefCell::new(None))
+                Geometry::Triangles(surfaces, triangles.collect(), RefCell::new(None))
             }
         };
         FragmentStage {
-            too_much: world.views().find_map(|view| left.fits(world, view).err()),
-            left,
-            world,
+            too_much: setup.views().find_map(|v| geometry.fits(setup, v).err()),
+            geometry,
+            setup,
         }
     }
 
     /// Draws a view with a test; appends the items in front at any sample.
     fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> Tally {
-        let (rays, grid) = (self.world.rays(view), self.world.samples);
-        match &self.left {
-            Left::Boxes(views, image) => {
+        let (rays, grid) = (self.setup.rays(view), self.setup.samples);
+        match &self.geometry {
+            Geometry::Boxes(views, image) => {
                 let new = || {
                     let canvas = Canvas::about(rays, grid, DVec3::ZERO);
                     (canvas, Drawn::new(grid.samples()))
@@ -124,12 +127,12 @@ impl<'w> FragmentStage<'w> {
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays);
-                let surfaces = self.world.cut_outs.as_ref().filter(|_| test != Z);
+                let surfaces = self.setup.cut_outs.as_ref().filter(|_| test != Z);
                 views[view].draw(test, surfaces, canvas, drawn);
                 out.extend(drawn.visible(canvas));
                 drawn.tally
             }
-            Left::Triangles(surfaces, views, image) => {
+            Geometry::Triangles(surfaces, views, image) => {
                 let new = || {
                     let canvas = Canvas::about(rays, grid, surfaces.origin);
                     (canvas, Drawn::new(grid.samples()))
@@ -139,7 +142,7 @@ impl<'w> FragmentStage<'w> {
                 canvas.turn_to(rays);
                 drawn.draw_triangles(canvas, surfaces, &views[view]);
                 // Floors and ceilings of a map follow its items.
-                let items = self.world.items() as ItemId;
+                let items = self.setup.items() as ItemId;
                 let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.filter(|item| *item < items));
                 drawn.tally
@@ -151,13 +154,13 @@ impl<'w> FragmentStage<'w> {
     ///
     /// The latter are the compared rows and the default test, the baseline of the others.
     fn tests(&self) -> impl Iterator<Item = BackEnd> {
-        let world = self.world;
-        let compared = world.rows(StageKind::Fragment);
-        let default = default_test(world.cut_outs.is_some());
+        let setup = self.setup;
+        let compared = setup.rows(StageKind::Fragment);
+        let default = default_test(setup.cut_outs.is_some());
         let is_drawn = move |row: &BackEnd| {
             row.name == default || compared.iter().any(|(own, _)| own.name == row.name)
         };
-        let rows = world.back_ends(StageKind::Fragment).into_iter();
+        let rows = setup.back_ends(StageKind::Fragment).into_iter();
         rows.filter(move |row| row.name == NONE || self.too_much.is_none() && is_drawn(row))
     }
 
@@ -173,18 +176,18 @@ impl<'w> FragmentStage<'w> {
     }
 
     /// Applies `none` and each test to the remaining items; tallies of drawn views.
-    pub fn tested(&self, stages: &ItemStages, truth: &Truth) -> Vec<(BackEnd, Errors, Vec<Tally>)> {
-        let world = self.world;
+    pub fn tested(&self, stages: &ItemStages, truth: &VisibleItems) -> Vec<TestResult> {
+        let setup = self.setup;
         let tested = self.tests().map(|back_end| {
             let (mut counts, mut tallies) = (Vec::new(), Vec::new());
-            for view in world.views() {
+            for view in setup.views() {
                 let given = stages.remaining(view);
                 let mut output = Vec::new();
                 match back_end.name {
-                    NONE => output.extend_from_slice(&world.listed(given)),
+                    NONE => output.extend_from_slice(&setup.listed(given)),
                     test => tallies.push(self.draw(test, view, &mut output)),
                 }
-                counts.push(count_items(given, world.items(), &output, &truth[view]));
+                counts.push(count_items(given, setup.items(), &output, &truth[view]));
             }
             (back_end, Errors::of(&counts), tallies)
         });
@@ -193,13 +196,13 @@ impl<'w> FragmentStage<'w> {
 }
 
 /// Solid boxes of a view.
-struct Boxes {
+struct BoxView {
     bodies: Vec<SolidBox>,
-    room: Option<Room>,
+    pass: Option<PortalPass>,
 }
 
 /// Rooms around an eye that is in rooms, for the stencil test.
-struct Room {
+struct PortalPass {
     /// Portals as flat boxes.
     portals: Vec<WorldBox>,
     /// Boxes that meet the rooms.
@@ -207,7 +210,7 @@ struct Room {
     beyond: Vec<SolidBox>,
 }
 
-impl Boxes {
+impl BoxView {
     /// Redraws the image with a test; `surfaces` may have holes.
     fn draw(&self, test: &str, surfaces: Option<&Holes>, canvas: &Canvas, drawn: &mut Drawn) {
         drawn.clear();
@@ -215,25 +218,25 @@ impl Boxes {
             surfaces,
             ..Tests::default()
         };
-        match self.room.as_ref().filter(|_| test == STENCIL) {
+        match self.pass.as_ref().filter(|_| test == STENCIL) {
             None => drawn.draw(canvas, self.bodies.iter().copied(), &tests),
-            Some(room) => {
-                drawn.draw(canvas, room.near.iter().copied(), &tests);
+            Some(pass) => {
+                drawn.draw(canvas, pass.near.iter().copied(), &tests);
                 // Samples whose ray reaches a portal before everything drawn so far.
-                let stencil = drawn.stencil(canvas, &room.portals);
+                let stencil = drawn.stencil(canvas, &pass.portals);
                 drawn.tally.asked_count += stencil.tested;
                 let stencil = Some(&stencil);
-                let beyond = room.beyond.iter().copied();
+                let beyond = pass.beyond.iter().copied();
                 drawn.draw(canvas, beyond, &Tests { stencil, ..tests });
             }
         }
     }
 }
 
-impl Room {
+impl PortalPass {
     /// Rooms of the eye; `None` if it is in no room.
-    fn of(world: &World, rays: &Rays, bodies: &[SolidBox]) -> Option<Room> {
-        let regions = world.regions.as_ref()?;
+    fn of(setup: &Setup, rays: &Rays, bodies: &[SolidBox]) -> Option<PortalPass> {
+        let regions = setup.regions.as_ref()?;
         let graph = &regions.graph;
         let mut homes = Vec::new();
         if !graph.homes(rays, &mut homes) {
@@ -248,7 +251,7 @@ impl Room {
         let of_rooms: HashSet<ItemId> = of_rooms.copied().collect();
         let is_near = |body: &SolidBox| of_rooms.contains(&body.item);
         let (near, beyond) = bodies.iter().copied().partition(is_near);
-        Some(Room {
+        Some(PortalPass {
             portals: portals.collect(),
             near,
             beyond,

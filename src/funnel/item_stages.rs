@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::cell::RefCell;
 
+use super::setup::{PathView, Setup};
 use super::stage::{Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
 use super::task::{FunnelKey, KeyedTask};
-use super::truth::{Truth, ViewCounts, count_items};
-use super::world::{View, World};
+use super::visible_items::{ViewCounts, VisibleItems, count_items};
 use crate::camera::Camera;
 use crate::measure::Ask;
 use crate::query::ItemId;
@@ -14,14 +14,14 @@ use crate::visibility::occlusion;
 use crate::visibility::region::{IdSet, Scratch};
 
 /// Appends the items that a stage leaves; the argument is its input (`None`: all).
-pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
+pub type StageRun<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
-impl World<'_> {
+impl Setup<'_> {
     /// Back end of a stage of whole items, after the steps `before`.
     ///
     /// # Panics
     /// If there is no such back end.
-    pub fn run(&self, stage: StageKind, name: &str, before: &[Step]) -> Run<'_> {
+    pub fn run(&self, stage: StageKind, name: &str, before: &[Step]) -> StageRun<'_> {
         match stage {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
@@ -30,7 +30,7 @@ impl World<'_> {
         }
     }
 
-    fn run_region(&self, name: &str) -> Run<'_> {
+    fn run_region(&self, name: &str) -> StageRun<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
         let pairs = regions.pairs(name).expect("a row of the region stage");
         let state = RefCell::new((Scratch::default(), IdSet::default(), Vec::new()));
@@ -42,7 +42,7 @@ impl World<'_> {
         })
     }
 
-    fn run_object(&self, name: &str) -> Run<'_> {
+    fn run_object(&self, name: &str) -> StageRun<'_> {
         let found = self.structures.iter().find(|(spec, _)| spec.label == name);
         let (_, index) = found.expect("a structure that was built");
         let state = RefCell::new((IdSet::default(), Vec::new()));
@@ -61,7 +61,7 @@ impl World<'_> {
         })
     }
 
-    fn run_occlusion(&self, name: &str, before: &[Step]) -> Run<'_> {
+    fn run_occlusion(&self, name: &str, before: &[Step]) -> StageRun<'_> {
         let row = OCCLUSION_ROWS.iter().find(|row| row.name == name);
         let row = row.expect("a row of the occlusion stage");
         let occlude = RefCell::new((row.build)(self.samples, self.kernel));
@@ -70,7 +70,7 @@ impl World<'_> {
         let by_region = before.iter().any(|(stage, _)| *stage == StageKind::Region);
         Box::new(move |view, input, out| {
             let occluders = occluders[view];
-            let View { rays, volume, .. } = &self.views[view];
+            let PathView { rays, volume, .. } = &self.views[view];
             let view = occlusion::View::new(rays, volume, occluders, self.samples);
             (occlude.borrow_mut())(occluders, &view, out);
             if let (Some(items), true) = (input, by_region) {
@@ -82,24 +82,24 @@ impl World<'_> {
 
 /// Items that remain in each view after the back ends of the item stages.
 pub struct ItemStages<'w> {
-    pub world: &'w World<'w>,
+    pub setup: &'w Setup<'w>,
     /// Steps of the chain, whose items remain.
     steps: Vec<Step>,
     /// Ascending ids for each view, keyed by the steps that leave them.
-    left: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
+    outputs: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
 }
 
 impl<'w> ItemStages<'w> {
     /// Runs a chain and all chains that differ from it in one stage.
-    pub fn all(world: &'w World<'w>, chain: &Chain) -> ItemStages<'w> {
+    pub fn all(setup: &'w Setup<'w>, chain: &Chain) -> ItemStages<'w> {
         let mut all = ItemStages {
-            world,
+            setup,
             steps: chain.steps(),
-            left: Vec::new(),
+            outputs: Vec::new(),
         };
         all.run(&chain.steps());
         for stage in StageKind::OF_ITEMS {
-            for (_, name) in world.rows(stage) {
+            for (_, name) in setup.rows(stage) {
                 all.run(&chain.steps_with(stage, &name));
             }
             if chain.is_separate(stage) {
@@ -114,32 +114,32 @@ impl<'w> ItemStages<'w> {
         let Some(((stage, name), before)) = steps.split_last() else {
             return;
         };
-        if self.left.iter().any(|(own, _)| own == steps) {
+        if self.outputs.iter().any(|(own, _)| own == steps) {
             return;
         }
         self.run(before);
-        let run = self.world.run(*stage, name, before);
-        let output = self.world.views().map(|view| {
+        let run = self.setup.run(*stage, name, before);
+        let output = self.setup.views().map(|view| {
             let mut ids = Vec::new();
             run(view, self.items(before, view), &mut ids);
             ids.sort_unstable();
             ids
         });
         let output = output.collect();
-        self.left.push((steps.to_vec(), output));
+        self.outputs.push((steps.to_vec(), output));
     }
 
     /// Items of each view after some steps; `None` means all items (no steps).
-    fn behind(&self, steps: &[Step]) -> Option<&[Vec<ItemId>]> {
-        let found = self.left.iter().find(|(own, _)| own == steps);
-        let left = found.map(|(_, left)| &left[..]);
-        assert!(left.is_some() || steps.is_empty(), "steps that were run");
-        left
+    fn after(&self, steps: &[Step]) -> Option<&[Vec<ItemId>]> {
+        let found = self.outputs.iter().find(|(own, _)| own == steps);
+        let outputs = found.map(|(_, outputs)| &outputs[..]);
+        assert!(outputs.is_some() || steps.is_empty(), "steps that were run");
+        outputs
     }
 
     /// Items of a view after some steps; `None` means all items (no steps).
     pub fn items(&self, steps: &[Step], view: usize) -> Option<&[ItemId]> {
-        self.behind(steps).map(|left| &left[view][..])
+        self.after(steps).map(|outputs| &outputs[view][..])
     }
 
     /// Remaining items of a view; `None` means all items.
@@ -149,36 +149,36 @@ impl<'w> ItemStages<'w> {
 
     /// Ids of the remaining items of a view.
     pub fn listed(&self, view: usize) -> Cow<'_, [ItemId]> {
-        self.world.listed(self.remaining(view))
+        self.setup.listed(self.remaining(view))
     }
 
     /// Mean number of items per view that a chain leaves.
     pub fn mean_count(&self, chain: &Chain) -> f64 {
         let steps = chain.steps();
-        let left = self.world.views().map(|view| self.items(&steps, view));
-        let counts = left.map(|left| left.map_or(self.world.items(), <[ItemId]>::len) as f64);
-        counts.sum::<f64>() / self.world.views.len().max(1) as f64
+        let sets = self.setup.views().map(|view| self.items(&steps, view));
+        let counts = sets.map(|set| set.map_or(self.setup.items(), <[ItemId]>::len) as f64);
+        counts.sum::<f64>() / self.setup.views.len().max(1) as f64
     }
 
     /// Counts of the last of some steps in each view.
-    pub fn counts(&self, before: &[Step], steps: &[Step], truth: &Truth) -> Vec<ViewCounts> {
-        let views = self.world.views();
+    pub fn counts(&self, before: &[Step], steps: &[Step], truth: &VisibleItems) -> Vec<ViewCounts> {
+        let views = self.setup.views();
         let count = |view: usize| {
-            let output = self.world.listed(self.items(steps, view));
+            let output = self.setup.listed(self.items(steps, view));
             let input = self.items(before, view);
-            count_items(input, self.world.items(), &output, &truth[view])
+            count_items(input, self.setup.items(), &output, &truth[view])
         };
         views.map(count).collect()
     }
 
     /// Tasks of all steps that were run.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.left.iter().map(|(steps, _)| {
+        self.outputs.iter().map(|(steps, _)| {
             let ((stage, name), before) = steps.split_last().expect("at least one step");
-            let run = self.world.run(*stage, name, before);
-            let input = self.behind(before);
+            let run = self.setup.run(*stage, name, before);
+            let input = self.after(before);
             let ask: Ask = Box::new(move |view, out| {
-                run(view, input.map(|left| &left[view][..]), out);
+                run(view, input.map(|outputs| &outputs[view][..]), out);
             });
             (FunnelKey::Steps(steps.clone()), ask)
         })
@@ -196,7 +196,7 @@ impl<'w> ItemStages<'w> {
 
 /// Outcome for an item: the stage that removed it, or its visibility.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Fate {
+pub enum ItemOutcome {
     /// Removed by a stage.
     Removed(StageKind),
     /// Kept by all stages, but not visible at any sample.
@@ -213,40 +213,40 @@ pub struct PlanView {
     /// Camera of the view; `None` without views.
     pub camera: Option<Camera>,
     /// Fates by item.
-    pub fates: Vec<Fate>,
+    pub outcomes: Vec<ItemOutcome>,
 }
 
 impl PlanView {
     /// First of the views with the most visible items, under a chain's item stages.
-    pub fn of(world: &World, stages: &ItemStages, chain: &Chain, truth: &Truth) -> PlanView {
-        let both = world.views.iter().zip(truth).enumerate();
+    pub fn of(setup: &Setup, stages: &ItemStages, chain: &Chain, truth: &VisibleItems) -> PlanView {
+        let both = setup.views.iter().zip(truth).enumerate();
         let most = both.rev().max_by_key(|(_, (_, visible))| visible.len());
         let Some((place, (view, visible))) = most else {
             return PlanView::default();
         };
-        let left = StageKind::OF_ITEMS.map(|stage| {
+        let outputs = StageKind::OF_ITEMS.map(|stage| {
             let steps = chain.steps_with(stage, chain.of(stage));
             (stage, stages.items(&steps, place))
         });
         let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
-        let items = (0..).take(world.scene.items.len());
-        let fates = items.map(|item| fate(item, &left, is_visible(item)));
+        let items = (0..).take(setup.scene.items.len());
+        let outcomes = items.map(|item| outcome(item, &outputs, is_visible(item)));
         PlanView {
             camera: Some(view.rays.camera),
-            fates: fates.collect(),
+            outcomes: outcomes.collect(),
         }
     }
 }
 
 /// Fate of an item, from the ascending ids after each stage (`None`: all items).
-fn fate(item: ItemId, left: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> Fate {
+fn outcome(item: ItemId, sets: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> ItemOutcome {
     let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
-    let removed = left.iter().find(|(_, set)| lacks(set));
+    let removed = sets.iter().find(|(_, set)| lacks(set));
     match (removed, is_visible) {
-        (Some(_), true) => Fate::Lost,
-        (Some((stage, _)), false) => Fate::Removed(*stage),
-        (None, true) => Fate::Visible,
-        (None, false) => Fate::Kept,
+        (Some(_), true) => ItemOutcome::Lost,
+        (Some((stage, _)), false) => ItemOutcome::Removed(*stage),
+        (None, true) => ItemOutcome::Visible,
+        (None, false) => ItemOutcome::Kept,
     }
 }
 
@@ -261,11 +261,11 @@ mod tests {
             (StageKind::Object, Some(&[1, 2, 3])),
             (StageKind::Occlusion, Some(&[1, 3])),
         ];
-        let of = |item, is_visible| fate(item, &sets, is_visible);
-        assert_eq!(of(1, true), Fate::Visible);
-        assert_eq!(of(3, false), Fate::Kept);
-        assert_eq!(of(2, false), Fate::Removed(StageKind::Occlusion));
-        assert_eq!(of(2, true), Fate::Lost);
-        assert_eq!(of(7, false), Fate::Removed(StageKind::Object));
+        let of = |item, is_visible| outcome(item, &sets, is_visible);
+        assert_eq!(of(1, true), ItemOutcome::Visible);
+        assert_eq!(of(3, false), ItemOutcome::Kept);
+        assert_eq!(of(2, false), ItemOutcome::Removed(StageKind::Occlusion));
+        assert_eq!(of(2, true), ItemOutcome::Lost);
+        assert_eq!(of(7, false), ItemOutcome::Removed(StageKind::Object));
     }
 }

@@ -8,8 +8,8 @@ use std::rc::Rc;
 use serde::Serialize;
 
 use super::error::LeftOutRow;
+use super::setup::{Setup, Shape};
 use super::task::{FunnelKey, KeyedTask, PickQuestion};
-use super::world::{Shape, World};
 use crate::camera::Surroundings;
 use crate::geometry::ConvexVolume;
 use crate::index::Kind;
@@ -64,7 +64,7 @@ impl PickRow {
 }
 
 /// Appends the answer at a cursor of a view.
-type Answer<'w> = Box<dyn Fn(&Cursor, &mut Vec<ItemId>) + 'w>;
+type PickAnswer<'w> = Box<dyn Fn(&Cursor, &mut Vec<ItemId>) + 'w>;
 
 /// A cursor: its ray, and a small rectangle of the image around it.
 struct Cursor {
@@ -78,8 +78,8 @@ struct Cursor {
 
 /// Every back end with its row, and the cursors of every view.
 pub struct Picks<'w> {
-    world: &'w World<'w>,
-    pickers: Vec<(PickRow, Answer<'w>)>,
+    setup: &'w Setup<'w>,
+    pickers: Vec<(PickRow, PickAnswer<'w>)>,
     cursors: Vec<Vec<Cursor>>,
     /// Linear searches left out because they have too many bodies.
     pub left_out: Vec<LeftOutRow>,
@@ -87,19 +87,19 @@ pub struct Picks<'w> {
 
 impl<'w> Picks<'w> {
     /// Builds all back ends, except linear searches over too many bodies.
-    pub fn new(world: &'w World<'w>) -> Picks<'w> {
-        let around = world.scene.surroundings();
-        let of_view = |view| cursors(world.rays(view), world.samples, &around);
+    pub fn new(setup: &'w Setup<'w>) -> Picks<'w> {
+        let around = setup.scene.surroundings();
+        let of_view = |view| cursors(setup.rays(view), setup.samples, &around);
         let mut picks = Picks {
-            world,
+            setup,
             pickers: Vec::new(),
-            cursors: world.views().map(of_view).collect(),
+            cursors: setup.views().map(of_view).collect(),
             left_out: Vec::new(),
         };
-        match &world.shape {
+        match &setup.shape {
             Shape::Boxes(solids) => picks.add_rays(&Boxes::of(solids), "item"),
             Shape::Triangles(surfaces) => {
-                let facets = Facets::solid(surfaces, world.items());
+                let facets = Facets::solid(surfaces, setup.items());
                 picks.add_rays(&facets, "triangle");
             }
         }
@@ -116,7 +116,7 @@ impl<'w> Picks<'w> {
                 self.left_out.push(row);
                 continue;
             }
-            let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.world.kernel));
+            let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.setup.kernel));
             let declared = |question| PickRow {
                 question,
                 name: row.name.to_owned(),
@@ -125,10 +125,10 @@ impl<'w> Picks<'w> {
                 ..PickRow::default()
             };
             let same = pick.clone();
-            let first: Answer = Box::new(move |cursor, out| {
+            let first: PickAnswer = Box::new(move |cursor, out| {
                 out.extend(pick.first(&cursor.ray));
             });
-            let nearest: Answer = Box::new(move |cursor, out| {
+            let nearest: PickAnswer = Box::new(move |cursor, out| {
                 same.nearest(&cursor.ray, NEAREST, out);
             });
             let first = (declared(PickQuestion::First), first);
@@ -140,16 +140,16 @@ impl<'w> Picks<'w> {
 
     /// Adds the structures of the object stage, queried with the cursors' frusta.
     fn add_frusta(&mut self) {
-        let world = self.world;
-        for (spec, index) in &world.structures {
+        let setup = self.setup;
+        for (spec, index) in &setup.structures {
             let is_loop = spec.row.info.kind == Kind::Scan;
-            if is_loop && world.items() > MOST_FOR_LOOP {
+            if is_loop && setup.items() > MOST_FOR_LOOP {
                 let when = "for each cursor's frustum";
-                let row = too_many(&spec.label, world.items(), "item", when);
+                let row = too_many(&spec.label, setup.items(), "item", when);
                 self.left_out.push(row);
                 continue;
             }
-            let through: Answer = Box::new(move |cursor, out| {
+            let through: PickAnswer = Box::new(move |cursor, out| {
                 if let Some(volume) = &cursor.volume {
                     index.visible(volume, out);
                 }
@@ -182,17 +182,17 @@ impl<'w> Picks<'w> {
     /// The exact answers come from the tree that wide-ray searches too; in small enough scenes,
     /// linear, which shares nothing with that tree, is compared as well.
     pub fn compared(&self) -> Vec<PickRow> {
-        let exact: Box<dyn Pick> = match &self.world.shape {
+        let exact: Box<dyn Pick> = match &self.setup.shape {
             Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),
             Shape::Triangles(surfaces) => {
-                let facets = Facets::solid(surfaces, self.world.items());
-                Box::new(SurfaceIndex::of(&facets, self.world.kernel))
+                let facets = Facets::solid(surfaces, self.setup.items());
+                Box::new(SurfaceIndex::of(&facets, self.setup.kernel))
             }
         };
         let mut rows: Vec<PickRow> = self.pickers.iter().map(|(row, _)| row.clone()).collect();
         let mut found = Vec::new();
-        for (cursors, view) in self.cursors.iter().zip(self.world.views()) {
-            let rays = self.world.rays(view);
+        for (cursors, view) in self.cursors.iter().zip(self.setup.views()) {
+            let rays = self.setup.rays(view);
             for cursor in cursors {
                 let truth = self.truth(&*exact, rays, cursor);
                 for (row, (_, answer)) in rows.iter_mut().zip(&self.pickers) {
@@ -206,8 +206,8 @@ impl<'w> Picks<'w> {
         rows
     }
 
-    fn truth(&self, exact: &dyn Pick, rays: &Rays, cursor: &Cursor) -> Truth {
-        let scene = self.world.scene;
+    fn truth(&self, exact: &dyn Pick, rays: &Rays, cursor: &Cursor) -> PickTruth {
+        let scene = self.setup.scene;
         let is_small = scene.items.len() <= MOST_FOR_LOOP;
         let in_planes = cursor.volume.as_ref().filter(|_| is_small).map(|volume| {
             let ids = (0..).zip(&scene.items).filter(|(_, b)| volume.sees(b));
@@ -215,7 +215,7 @@ impl<'w> Picks<'w> {
         });
         let mut nearest = Vec::new();
         exact.nearest(&cursor.ray, NEAREST, &mut nearest);
-        Truth {
+        PickTruth {
             first: Vec::from_iter(exact.first(&cursor.ray)),
             nearest,
             met: met_within(exact, rays, &cursor.rectangle),
@@ -250,7 +250,7 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
 }
 
 /// Exact answers at a cursor.
-struct Truth {
+struct PickTruth {
     first: Vec<ItemId>,
     /// Sorted by depth, then by id.
     nearest: Vec<ItemId>,
@@ -262,7 +262,7 @@ struct Truth {
     in_planes: Option<Vec<ItemId>>,
 }
 
-impl Truth {
+impl PickTruth {
     /// Returns `true` if an answer is exact; sorts an answer that is a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
@@ -298,7 +298,7 @@ mod tests {
     /// A missing item, an extra item or a different order makes an answer wrong.
     #[test]
     fn answers_are_held_against_the_exact_ones() {
-        let truth = Truth {
+        let truth = PickTruth {
             first: vec![4],
             nearest: vec![4, 2, 9],
             met: vec![2, 4],
@@ -312,7 +312,7 @@ mod tests {
         assert!(!agrees(PickQuestion::Nearest, &[4, 2]));
         assert!(agrees(PickQuestion::Through, &[9, 4, 2]));
         assert!(!agrees(PickQuestion::Through, &[4, 2]));
-        let large = Truth {
+        let large = PickTruth {
             in_planes: None,
             ..truth
         };

@@ -8,7 +8,7 @@ use super::item_stages::PlanView;
 use super::picks::PickRow;
 use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, default_test};
 use super::task::FunnelKey;
-use super::truth::Errors;
+use super::visible_items::Errors;
 use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
 use crate::statistics::{ALPHA, Estimate, centre, flat, ratio, trimmed_mean};

@@ -9,11 +9,11 @@ use super::fragment_stage::{FragmentCounts, FragmentStage};
 use super::item_stages::{ItemStages, PlanView};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
+use super::setup::{FunnelInput, Setup};
 use super::stage::{Chain, NONE, StageKind, default_test, left_out_of};
 use super::task::{FunnelPlan, KeyedTask};
 use super::triangle_stage::TriangleStage;
-use super::truth::{Errors, Truth, visible};
-use super::world::{FunnelInput, World};
+use super::visible_items::{Errors, VisibleItems, visible};
 use crate::input::{InputError, warn};
 use crate::measure::{ProcessTimes, Setting, Verdict};
 use crate::scene::memory::{available_bytes, fits_into};
@@ -47,18 +47,18 @@ struct Study<'w> {
 }
 
 impl<'w> Study<'w> {
-    fn new(world: &'w World<'w>, input: &'w FunnelInput) -> Result<Study<'w>> {
+    fn new(setup: &'w Setup<'w>, input: &'w FunnelInput) -> Result<Study<'w>> {
         let chain = &input.chain;
-        let items = ItemStages::all(world, chain);
-        if world.shape.boxes().is_some() {
-            let left = items.mean_count(chain) * world.views.len() as f64;
-            check_memory(&world.scene.name, (left * BYTES_PER_LEFT) as u64)?;
+        let items = ItemStages::all(setup, chain);
+        if setup.shape.boxes().is_some() {
+            let left = items.mean_count(chain) * setup.views.len() as f64;
+            check_memory(&setup.scene.name, (left * BYTES_PER_LEFT) as u64)?;
         }
         let triangles = TriangleStage::new(&items);
         let culled = (&triangles, chain.of(StageKind::Triangle));
         let fragments = FragmentStage::new(&items, culled);
         Ok(Study {
-            picks: (input.all && input.picks).then(|| Picks::new(world)),
+            picks: (input.all && input.picks).then(|| Picks::new(setup)),
             chain,
             items,
             triangles,
@@ -76,10 +76,10 @@ impl<'w> Study<'w> {
     }
 
     /// Rows of all stages before the fragment stage.
-    fn rows(&self, truth: &Truth) -> Vec<StageRow> {
+    fn rows(&self, truth: &VisibleItems) -> Vec<StageRow> {
         let mut rows = Vec::new();
         for stage in [&StageKind::OF_ITEMS[..], &[StageKind::Triangle]].concat() {
-            for (back_end, name) in self.items.world.rows(stage) {
+            for (back_end, name) in self.items.setup.rows(stage) {
                 let counts = match stage {
                     StageKind::Triangle => self.triangles.counts(&name),
                     _ => {
@@ -132,7 +132,7 @@ impl<'w> Study<'w> {
     ///
     /// Without a fragment test every fragment of the remaining items is shaded.
     fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
-        let default = default_test(self.items.world.cut_outs.is_some());
+        let default = default_test(self.items.setup.cut_outs.is_some());
         let every = rows.iter().find(|row| row.back_end.name == default);
         match row.fragments.zip(every.and_then(|row| row.fragments)) {
             Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
@@ -142,7 +142,7 @@ impl<'w> Study<'w> {
 }
 
 /// A study that is compared with the truth, but not timed.
-pub struct Prepared {
+pub struct UntimedFunnel {
     /// Tasks and schedule for all processes.
     pub plan: FunnelPlan,
     report: FunnelReport,
@@ -154,18 +154,18 @@ pub struct Prepared {
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that is rejected.
-pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
+pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunnel> {
     let Setting { scene, path, .. } = input.setting;
     fits(input.samples, available_bytes())?;
-    let world = World::new(input, begin)?;
+    let setup = Setup::new(input, begin)?;
     let mut warnings = crate::path::warnings(scene, &path.name, &path.cameras);
-    let rounded = world.rounded();
+    let rounded = setup.rounded();
     rounded.iter().for_each(|text| warn(text));
     warnings.extend(rounded);
     begin("truth");
-    let truth = visible(&world, input.execution.threads)?;
+    let truth = visible(&setup, input.execution.threads)?;
     begin("every stage, compared with the truth");
-    let study = Study::new(&world, input)?;
+    let study = Study::new(&setup, input)?;
     let mut rows = study.rows(&truth);
     for (back_end, errors, tallies) in study.fragments.tested(&study.items, &truth) {
         rows.push(StageRow {
@@ -186,14 +186,14 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         let reason = "not asked for: --no-picks";
         left_out.push(LeftOutRow::new("picks", "all", reason));
     }
-    let cut_outs = input.cut_outs.zip(world.cut_outs.as_ref());
-    let ground = world.hiders.ground.as_ref();
+    let cut_outs = input.cut_outs.zip(setup.cut_outs.as_ref());
+    let ground = setup.hiders.ground.as_ref();
     let report = FunnelReport {
         scene: scene.name.clone(),
         path: path.name.clone(),
         items: scene.items.len(),
         skipped_items: scene.skipped_items,
-        views: world.views.len(),
+        views: setup.views.len(),
         cameras: path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
@@ -205,21 +205,21 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,
-        inner_boxes: world.hiders.inner.clone(),
+        inner_boxes: setup.hiders.inner.clone(),
         ground: ground.map(|ground| ground.row.clone()),
-        solid_blocks: world.hiders.blocks.clone(),
+        solid_blocks: setup.hiders.blocks.clone(),
         picks,
         left_out,
         conclusions: Vec::new(),
         warnings,
-        plan_view: PlanView::of(&world, &study.items, &input.chain, &truth),
+        plan_view: PlanView::of(&setup, &study.items, &input.chain, &truth),
     };
     let mut tasks = study.tasks();
     if !input.all {
         tasks.retain(|(key, _)| report.needs(key));
     }
-    Ok(Prepared {
-        plan: FunnelPlan::of(tasks, world.views.len(), input),
+    Ok(UntimedFunnel {
+        plan: FunnelPlan::of(tasks, setup.views.len(), input),
         report,
     })
 }
@@ -229,12 +229,12 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<Prepared> {
 /// # Errors
 /// The errors of [`prepare`].
 pub fn time(input: &FunnelInput, plan: &FunnelPlan) -> Result<ProcessTimes> {
-    let world = World::new(input, &|_| ())?;
-    let study = Study::new(&world, input)?;
+    let setup = Setup::new(input, &|_| ())?;
+    let study = Study::new(&setup, input)?;
     Ok(plan.time(study.tasks(), input))
 }
 
-impl Prepared {
+impl UntimedFunnel {
     /// Builds the report from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> FunnelReport {
         let times = self.plan.times(processes);

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::setup::FunnelInput;
 use super::stage::{StageKind, Step};
-use super::world::FunnelInput;
 use crate::measure::{Ask, ProcessTimes, StudyPlan, TimedTask};
 
 named! {

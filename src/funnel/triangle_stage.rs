@@ -9,10 +9,10 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::item_stages::ItemStages;
+use super::setup::{Setup, Shape};
 use super::stage::StageKind;
 use super::task::{FunnelKey, KeyedTask};
-use super::truth::ViewCounts;
-use super::world::{Shape, World};
+use super::visible_items::ViewCounts;
 use crate::camera::Camera;
 use crate::kernel::Kernel;
 use crate::measure::Ask;
@@ -41,19 +41,19 @@ fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
 }
 
 /// Clusters and the compared back ends over them.
-struct Built {
+struct ClusterBackEnds {
     clusters: Arc<Clusters>,
     culls: Vec<(&'static str, Box<dyn TriangleCull>)>,
 }
 
-impl Built {
-    fn of(world: &World, surfaces: Arc<Surfaces>) -> Rc<Built> {
+impl ClusterBackEnds {
+    fn of(setup: &Setup, surfaces: Arc<Surfaces>) -> Rc<ClusterBackEnds> {
         let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
-        let compared = world.rows(StageKind::Triangle);
+        let compared = setup.rows(StageKind::Triangle);
         let is_compared = |row: &&TriangleRow| compared.iter().any(|(own, _)| own.name == row.name);
         let rows = TRIANGLE_ROWS.iter().filter(is_compared);
         let culls = rows.map(|row| (row.name, (row.build)(&clusters)));
-        Rc::new(Built {
+        Rc::new(ClusterBackEnds {
             culls: culls.collect(),
             clusters,
         })
@@ -61,8 +61,8 @@ impl Built {
 }
 
 /// Triangles of one view.
-struct Faces {
-    built: Rc<Built>,
+struct TriangleView {
+    back_ends: Rc<ClusterBackEnds>,
     given: Selection,
     eye: Eye,
     /// Triangles that face the eye.
@@ -71,7 +71,7 @@ struct Faces {
 
 /// Triangles of the remaining items in every view.
 pub struct TriangleStage {
-    views: Vec<Faces>,
+    views: Vec<TriangleView>,
     kernel: Kernel,
 }
 
@@ -80,52 +80,52 @@ impl TriangleStage {
     ///
     /// A box has 12 triangles, which takes much memory if an earlier stage is left out.
     pub fn new(stages: &ItemStages) -> TriangleStage {
-        let world = stages.world;
-        let whole = match &world.shape {
-            Shape::Triangles(all) => Ok(Built::of(world, all.clone())),
+        let setup = stages.setup;
+        let whole = match &setup.shape {
+            Shape::Triangles(all) => Ok(ClusterBackEnds::of(setup, all.clone())),
             Shape::Boxes(solids) => Err(solids),
         };
-        let views = world.views().map(|view| {
+        let views = setup.views().map(|view| {
             let items = stages.listed(view);
-            let camera = &world.rays(view).camera;
-            let built = whole.clone().unwrap_or_else(|solids| {
+            let camera = &setup.rays(view).camera;
+            let back_ends = whole.clone().unwrap_or_else(|solids| {
                 let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
-                let origin = origin_of(world.scene, camera);
-                Built::of(world, Arc::new(Surfaces::of_boxes_about(origin, boxes)))
+                let origin = origin_of(setup.scene, camera);
+                ClusterBackEnds::of(setup, Arc::new(Surfaces::of_boxes_about(origin, boxes)))
             });
             let given = match whole.is_ok() {
-                true => Selection::of_items(&built.clusters, items.iter().copied()),
-                false => Selection::all(&built.clusters),
+                true => Selection::of_items(&back_ends.clusters, items.iter().copied()),
+                false => Selection::all(&back_ends.clusters),
             };
-            let eye = Eye::of(camera, origin_of(world.scene, camera));
-            Faces {
-                truth: facing(&built.clusters, &eye, &given),
+            let eye = Eye::of(camera, origin_of(setup.scene, camera));
+            TriangleView {
+                truth: facing(&back_ends.clusters, &eye, &given),
                 given,
                 eye,
-                built,
+                back_ends,
             }
         });
         TriangleStage {
             views: views.collect(),
-            kernel: world.kernel,
+            kernel: setup.kernel,
         }
     }
 
     /// Triangles that a back end leaves; all of them for `none`.
     fn kept(&self, name: &str, view: usize) -> Selection {
-        let faces = &self.views[view];
-        let mut kept = faces.given.clone();
-        let mut culls = faces.built.culls.iter();
+        let view = &self.views[view];
+        let mut kept = view.given.clone();
+        let mut culls = view.back_ends.culls.iter();
         if let Some((_, cull)) = culls.find(|(own, _)| *own == name) {
-            cull.cull(&faces.eye, self.kernel, &mut kept);
+            cull.cull(&view.eye, self.kernel, &mut kept);
         }
         kept
     }
 
     /// Tasks of all back ends; the ids are of clusters with a triangle left.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        let built = self.views.first().map(|faces| &faces.built.culls);
-        built.into_iter().flatten().map(move |(name, _)| {
+        let back_ends = self.views.first().map(|view| &view.back_ends.culls);
+        back_ends.into_iter().flatten().map(move |(name, _)| {
             let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
             let ask: Ask = Box::new(move |view, out| {
                 let kept = self.kept(name, view);
@@ -140,7 +140,7 @@ impl TriangleStage {
     /// Indices of the triangles that a back end leaves in a view, among the surfaces.
     pub fn triangles(&self, name: &str, view: usize) -> Vec<u32> {
         let kept = self.kept(name, view);
-        let clusters = &self.views[view].built.clusters;
+        let clusters = &self.views[view].back_ends.clusters;
         let mut triangles = Vec::with_capacity(kept.triangles());
         for (cluster, word) in kept.words().iter().enumerate() {
             let all = clusters.triangles_of(cluster).iter().enumerate();
@@ -151,10 +151,10 @@ impl TriangleStage {
 
     /// Counts of a back end in each view, compared with the exact facing test.
     pub fn counts(&self, name: &str) -> Vec<ViewCounts> {
-        let count = |(view, faces): (usize, &Faces)| {
-            let (kept, right) = (self.kept(name, view), &faces.truth);
+        let count = |(n, view): (usize, &TriangleView)| {
+            let (kept, right) = (self.kept(name, n), &view.truth);
             let [input, output, truth] =
-                [&faces.given, &kept, right].map(|of| of.triangles() as u64);
+                [&view.given, &kept, right].map(|of| of.triangles() as u64);
             ViewCounts {
                 input,
                 output,

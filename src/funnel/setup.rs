@@ -114,7 +114,7 @@ impl Shape {
 }
 
 /// A camera of the path.
-pub struct View {
+pub struct PathView {
     /// Index in the path.
     pub camera: usize,
     pub volume: ConvexVolume,
@@ -122,11 +122,11 @@ pub struct View {
 }
 
 /// A scene and the views of a path, prepared for every back end.
-pub struct World<'a> {
+pub struct Setup<'a> {
     pub scene: &'a Scene,
     pub kernel: Kernel,
     pub samples: SampleGrid,
-    pub views: Vec<View>,
+    pub views: Vec<PathView>,
     pub shape: Shape,
     /// Items that have holes, if any.
     pub cut_outs: Option<fragment::Holes>,
@@ -139,13 +139,13 @@ pub struct World<'a> {
     only: Option<Chain>,
 }
 
-impl<'a> World<'a> {
+impl<'a> Setup<'a> {
     /// Builds structures, regions and occluders; `begin` gets the name of each step.
     ///
     /// # Errors
     /// Options that do not fit the scene, a camera without frustum or rays, a structure that
     /// rejects the scene.
-    pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<World<'a>> {
+    pub fn new(input: &FunnelInput<'a>, begin: &dyn Fn(&str)) -> Result<Setup<'a>> {
         check_options(input)?;
         let scene = &input.setting.scene;
         let views = views(input)?;
@@ -176,7 +176,7 @@ impl<'a> World<'a> {
         }
         begin("occluders");
         let most = input.inner_boxes.unwrap_or(BOXES);
-        Ok(World {
+        Ok(Setup {
             hiders: Hiders::of(scene, shape.boxes(), most, input.execution.threads),
             scene,
             kernel: input.execution.kernel,
@@ -230,7 +230,7 @@ impl<'a> World<'a> {
             // A box may be wider than its triangles, like that of a patch's control points.
             let moved = (b.min - own.min).max(own.max - b.max);
             let share = moved.max_element() / (b.max - b.min).max_element();
-            let is_seen = |view: &View| view.volume.sees(&self.scene.items[item]);
+            let is_seen = |view: &PathView| view.volume.sees(&self.scene.items[item]);
             // A point has no edge.
             let share = Some(share).filter(|share| share.is_finite() && *share > MOST_MOVED);
             share.filter(|_| self.views.iter().any(is_seen))
@@ -283,7 +283,7 @@ fn rows<'l>(
 }
 
 /// Views evenly spread over the path.
-fn views(input: &FunnelInput) -> Result<Vec<View>> {
+fn views(input: &FunnelInput) -> Result<Vec<PathView>> {
     let Setting { scene, path, .. } = input.setting;
     let (around, all) = (scene.surroundings(), &path.cameras);
     let views = evenly(all.len(), input.most_views.max(1)).map(|index| {
@@ -295,7 +295,7 @@ fn views(input: &FunnelInput) -> Result<Vec<View>> {
         // Planes and rays come from the same numbers, also for a matrix camera.
         let volume = rays.camera.volume(&PlaneOptions::default(), &around);
         let volume = volume.map_err(refused)?;
-        Ok(View {
+        Ok(PathView {
             camera: index,
             volume,
             rays,
@@ -440,15 +440,15 @@ mod tests {
         let chain = Chain::for_scene(scene, &setting.structures, false);
         let views = (3, SampleGrid::new(8, 5));
         let input = FunnelInput::new(&setting, chain, views, Execution::default());
-        let world = World::new(&input, &|_| ()).expect("a world");
-        let run = |stage, name| world.run(stage, name, &[]);
+        let setup = Setup::new(&input, &|_| ()).expect("a world");
+        let run = |stage, name| setup.run(stage, name, &[]);
         let mut found = 0;
-        for view in world.views() {
+        for view in setup.views() {
             let (mut left, mut right, mut none) = (Vec::new(), Vec::new(), Vec::new());
             run(StageKind::Region, "portal-rect")(view, None, &mut left);
             run(StageKind::Object, "linear")(view, Some(&left), &mut right);
             run(StageKind::Object, "blind")(view, Some(&left), &mut none);
-            let sees = |id: &ItemId| world.views[view].volume.sees(&scene.items[*id as usize]);
+            let sees = |id: &ItemId| setup.views[view].volume.sees(&scene.items[*id as usize]);
             let wanted: Vec<ItemId> = left.iter().copied().filter(sees).collect();
             assert_eq!((right, none), (wanted.clone(), vec![]));
             found += wanted.len();

@@ -6,33 +6,33 @@ use anyhow::anyhow;
 use serde::Serialize;
 
 use super::error::most_drawn;
-use super::world::{Shape, World};
+use super::setup::{Setup, Shape};
 use crate::query::ItemId;
 use crate::statistics::{Estimate, rate_of};
 use crate::visibility::truth::{RayIndex, SampleTruth, SolidBox, SurfaceIndex};
 use crate::visibility::{Rays, SampleGrid, fragment};
 
 /// Coarse grid that estimates the number of body tests at all samples.
-const FEW: SampleGrid = SampleGrid::new(16, 9);
+const COARSE_GRID: SampleGrid = SampleGrid::new(16, 9);
 
 /// Number of body tests that take about as long as one front item.
 const TESTS_PER_ITEM: u64 = 16;
 
 /// Visible items of each view by ascending id, with their numbers of samples.
-pub type Truth = Vec<Vec<(ItemId, u32)>>;
+pub type VisibleItems = Vec<Vec<(ItemId, u32)>>;
 
 /// Visible items at the samples of every view.
 ///
 /// # Errors
 /// Too many items in front at the same samples, or too many bodies around the eye.
-pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
-    let rays_end = RaysEnd::at(&world.shape, world.cut_outs.as_ref());
-    let samples = world.samples;
-    let items = world.items() as ItemId;
+pub fn visible(setup: &Setup, threads: usize) -> anyhow::Result<VisibleItems> {
+    let targets = RayTargets::of(&setup.shape, setup.cut_outs.as_ref());
+    let samples = setup.samples;
+    let items = setup.items() as ItemId;
     let of_view = |view| {
-        let rays = world.rays(view);
-        let truth = rays_end.visible(rays, samples, threads);
-        let camera = world.views[view].camera;
+        let rays = setup.rays(view);
+        let truth = targets.visible(rays, samples, threads);
+        let camera = setup.views[view].camera;
         let truth = truth.map_err(|error| anyhow!("camera {camera}: {error}"))?;
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
@@ -40,21 +40,21 @@ pub fn visible(world: &World, threads: usize) -> anyhow::Result<Truth> {
         seen.retain(|(item, _)| *item < items);
         Ok(seen)
     };
-    world.views().map(of_view).collect()
+    setup.views().map(of_view).collect()
 }
 
 /// Surfaces that stop rays: solid boxes, or triangles with the floors of a map.
-pub enum RaysEnd<'w> {
+pub enum RayTargets<'w> {
     Boxes(RayIndex, Option<&'w fragment::Holes>),
     Triangles(SurfaceIndex),
 }
 
-impl RaysEnd<'_> {
+impl RayTargets<'_> {
     /// Surfaces of a scene of this shape, with the holes of its items.
-    pub fn at<'w>(shape: &Shape, holes: Option<&'w fragment::Holes>) -> RaysEnd<'w> {
+    pub fn of<'w>(shape: &Shape, holes: Option<&'w fragment::Holes>) -> RayTargets<'w> {
         match shape {
-            Shape::Boxes(solids) => RaysEnd::Boxes(RayIndex::build(solids), holes),
-            Shape::Triangles(surfaces) => RaysEnd::Triangles(SurfaceIndex::build(surfaces)),
+            Shape::Boxes(solids) => RayTargets::Boxes(RayIndex::build(solids), holes),
+            Shape::Triangles(surfaces) => RayTargets::Triangles(SurfaceIndex::build(surfaces)),
         }
     }
 
@@ -68,13 +68,13 @@ impl RaysEnd<'_> {
         samples: SampleGrid,
         threads: usize,
     ) -> Result<SampleTruth, String> {
-        let tests_at_few = match self {
-            RaysEnd::Boxes(index, _) => index.tests(rays, FEW),
-            RaysEnd::Triangles(index) => index.tests(rays, FEW),
+        let coarse_tests = match self {
+            RayTargets::Boxes(index, _) => index.tests(rays, COARSE_GRID),
+            RayTargets::Triangles(index) => index.tests(rays, COARSE_GRID),
         };
         let most = most_drawn(samples);
         let most_tests = most * TESTS_PER_ITEM;
-        let tests = tests_at_few * samples.samples() as u64 / FEW.samples() as u64;
+        let tests = coarse_tests * samples.samples() as u64 / COARSE_GRID.samples() as u64;
         let refused = |found: &str, most: u64, fewer: &str| {
             format!(
                 "{found}, summed over the samples; expected at most {most}: fewer samples or \
@@ -86,13 +86,13 @@ impl RaysEnd<'_> {
             return Err(refused(&found, most_tests, "around the eye"));
         }
         let truth = match self {
-            RaysEnd::Boxes(index, holes) => {
+            RayTargets::Boxes(index, holes) => {
                 let opaque = |body: &SolidBox, probe: &_, at: &_| {
                     holes.is_none_or(|holes| holes.opaque(body.item, &body.b, probe, at))
                 };
                 SampleTruth::of_opaque(index, &opaque, rays, samples, threads, most)
             }
-            RaysEnd::Triangles(index) => {
+            RayTargets::Triangles(index) => {
                 SampleTruth::of_opaque(index, &|_, _, _| true, rays, samples, threads, most)
             }
         };
