@@ -16,7 +16,7 @@ use crate::scene::{Scene, WorldBox};
 use crate::verify::Truth;
 
 /// Most verdicts of the oracle, which take some 50 ns each.
-const MOST_JUDGED: usize = 1_000_000;
+const MAX_TRUTHS: usize = 1_000_000;
 
 pub struct Case<'a> {
     pub workload: &'a Workload<'a>,
@@ -35,7 +35,7 @@ impl<'a> Case<'a> {
         [tree, scan]: &[String; 2],
     ) -> Result<Case<'a>, BuildError> {
         let setting = all.setting;
-        let [spec, scan] = [tree, scan].map(|label| planned(&setting.structures, label));
+        let [spec, scan] = [tree, scan].map(|label| spec_of(&setting.structures, label));
         Ok(Case {
             index: spec.build(input_of(workload.scene, &workload.scene.items))?,
             workload,
@@ -49,7 +49,7 @@ impl<'a> Case<'a> {
     pub fn truths(&self) -> Vec<(usize, Truth)> {
         let judged = spread(
             self.workload.scene.items.len(),
-            MOST_JUDGED,
+            MAX_TRUTHS,
             self.workload.views.len(),
         );
         let truths = judged.filter_map(|camera| {
@@ -113,7 +113,7 @@ impl<'a> Case<'a> {
 }
 
 /// Evenly spread boxes of a scene about another origin, rounded outward again.
-pub fn part_of(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
+pub fn subset(scene: &Scene, origin: DVec3, count: usize) -> Result<Scene, InputError> {
     let boxes = evenly(scene.items.len(), count);
     let boxes = boxes.map(|id| WorldBox::of(&scene.items[id], scene.origin));
     let boxes: Vec<WorldBox> = boxes.collect();
@@ -167,7 +167,7 @@ impl<'a> AdviseInput<'a> {
 /// Structure that a plan names by its label.
 ///
 /// From the list; else from the list with an added policy (`wide@rebuild`); else from this crate.
-pub(super) fn planned(structures: &[StructureSpec], label: &str) -> StructureSpec {
+pub(super) fn spec_of(structures: &[StructureSpec], label: &str) -> StructureSpec {
     let (alone, policy) = label.split_once('@').unwrap_or((label, ""));
     let named = |name: &str| structures.iter().find(|spec| spec.label == name).cloned();
     let Some(mut spec) = named(label).or_else(|| named(alone)) else {

@@ -6,7 +6,7 @@
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
-use super::case::{AdviseInput, part_of, planned};
+use super::case::{AdviseInput, spec_of, subset};
 use super::choice::{fastest, time_over};
 use super::trials::is_longer;
 use crate::culling::{Culling, CullingTest};
@@ -36,15 +36,15 @@ const AXES: [(Axis, [f64; 6]); 3] = [
     (Axis::ShareMoved, [0.0001, 0.001, 0.01, 0.1, 0.4, 1.0]),
 ];
 /// Smallest part of a scene, in items.
-const LEAST: f64 = 32.0;
+const MIN_ITEMS: f64 = 32.0;
 /// Least ratio of a measured value to that of the workload.
-const APART: f64 = 2.0;
+const SPACING: f64 = 2.0;
 /// Most frames of a changed workload.
 const FRAMES: usize = 20;
 
 /// Value from which another structure is faster.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Turn {
+pub struct Crossover {
     /// Fastest structure beyond it.
     pub structure: String,
     /// Value on the axis at which both structures take the same time.
@@ -71,14 +71,14 @@ pub struct Change {
     /// Reason why only the workload itself was measured; else null.
     pub not_varied: Option<String>,
     /// Turn below `here`; null if the advice holds down to the smallest value.
-    pub below: Option<Turn>,
+    pub below: Option<Crossover>,
     /// Turn above `here`; null if the advice holds up to the largest value.
-    pub above: Option<Turn>,
+    pub above: Option<Crossover>,
 }
 
 /// A workload varied along an axis.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Changed {
+struct VariedWorkload {
     /// `None` for the workload itself.
     axis: Option<Axis>,
     /// Requested value on the axis; `reached` is the actual one.
@@ -89,7 +89,7 @@ struct Changed {
 
 /// Workloads measured in addition to the rules, the same for all processes.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Beside {
+pub struct ExtraWorkloads {
     /// Labels of the contending structures.
     pub(super) contenders: Vec<String>,
     /// Label of the chosen structure with rebuilds, for the workload itself.
@@ -98,22 +98,22 @@ pub struct Beside {
     here: [Option<f64>; 3],
     /// Reasons why values of each axis were not measured.
     refused: [Option<String>; 3],
-    changed: Vec<Changed>,
+    changed: Vec<VariedWorkload>,
 }
 
-impl Beside {
+impl ExtraWorkloads {
     /// Plans the workloads; also returns the results of the count pass.
     pub(super) fn plan(
         input: &AdviseInput,
         (contenders, rebuilt): (Vec<String>, Option<String>),
         here: [Option<f64>; 3],
         progress: &dyn Fn(&str),
-    ) -> (Beside, Vec<Part>) {
-        let mut beside = Beside {
+    ) -> (ExtraWorkloads, Vec<Part>) {
+        let mut beside = ExtraWorkloads {
             contenders,
             rebuilt,
             here,
-            ..Beside::default()
+            ..ExtraWorkloads::default()
         };
         let is_choice = beside.contenders.len() > 1;
         let mut wanted = vec![(None, 0.0); usize::from(beside.rebuilt.is_some() || is_choice)];
@@ -123,15 +123,15 @@ impl Beside {
             let Some(here) = here else { continue };
             let whole = if axis == Axis::Items { here } else { 1.0 };
             let values = values.map(|value| value * whole).into_iter();
-            let values = values.filter(|value| axis != Axis::Items || *value >= LEAST);
-            let values = values.filter(|value| (value / here).max(here / value) >= APART);
+            let values = values.filter(|value| axis != Axis::Items || *value >= MIN_ITEMS);
+            let values = values.filter(|value| (value / here).max(here / value) >= SPACING);
             beside.refused[axis as usize] = Some("the scene is too small for parts".to_owned());
             wanted.extend(values.map(|value| (Some(axis), value)));
         }
         progress("other numbers of items, shares in view and shares moved");
         let mut parts = Vec::new();
         for (axis, value) in wanted {
-            let mut changed = Changed {
+            let mut changed = VariedWorkload {
                 axis,
                 value,
                 reached: value,
@@ -196,8 +196,8 @@ impl Beside {
                 here: value,
                 not_varied,
                 measured: [points[0].0, points[points.len() - 1].0],
-                below: turn(taken, down.collect()),
-                above: turn(taken, up.collect()),
+                below: crossover(taken, down.collect()),
+                above: crossover(taken, up.collect()),
             })
         });
         changes.collect()
@@ -205,7 +205,7 @@ impl Beside {
 }
 
 /// First of the points at which another structure is faster than the chosen one.
-fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
+fn crossover(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Crossover> {
     (1..points.len()).find_map(|n| {
         let (value, there) = *points[n];
         let first = fastest(there);
@@ -227,7 +227,7 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
             points[at].0 * (points[at + 1].0 / points[at].0).powf(along)
         });
         let (lower, upper) = (before.min(value), before.max(value));
-        Some(Turn {
+        Some(Crossover {
             structure: winner.structure.clone(),
             at: at.clamp(lower, upper),
             lower,
@@ -236,15 +236,15 @@ fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Turn> {
     })
 }
 
-impl Changed {
+impl VariedWorkload {
     /// Measures the workload; only counts if there is no count pass yet.
     ///
     /// # Errors
     /// There is no such workload.
-    fn measured(&self, input: &AdviseInput, beside: &Beside) -> anyhow::Result<(f64, Part)> {
+    fn measured(&self, input: &AdviseInput, all: &ExtraWorkloads) -> anyhow::Result<(f64, Part)> {
         let is = |axis| self.axis == Some(axis);
         let (whole, count) = (&input.setting.scene, self.value.round() as usize);
-        let part = is(Axis::Items).then(|| part_of(whole, whole.origin, count));
+        let part = is(Axis::Items).then(|| subset(whole, whole.origin, count));
         let part = part.transpose()?;
         let scene = part.as_ref().unwrap_or(whole);
         let mut path = input.setting.path.clone();
@@ -263,12 +263,12 @@ impl Changed {
         }
         let culling = Culling::default();
         let workload = Workload::moving(scene, &path, &culling, motion, input.views)?;
-        let rebuilt = beside.rebuilt.iter().filter(|_| self.axis.is_none());
+        let rebuilt = all.rebuilt.iter().filter(|_| self.axis.is_none());
         let build = |label: &String| {
-            let spec = planned(&input.setting.structures, label);
+            let spec = spec_of(&input.setting.structures, label);
             Subject::build(spec, false, scene, CullingTest::SixPlane)
         };
-        let subjects: Vec<_> = beside.contenders.iter().chain(rebuilt).map(build).collect();
+        let subjects: Vec<_> = all.contenders.iter().chain(rebuilt).map(build).collect();
         let info = SceneInfo::of(scene);
         let plan = GroupPlan {
             process: u32::from(self.known.is_some()),
@@ -322,7 +322,7 @@ mod tests {
     fn advice_turns_where_another_structure_is_faster_by_more_than_a_tie() {
         let of = |tree: f64| cells(&[("wide", tree), ("linear", 100.0)]);
         let [here, tie, slower] = [of(50.0), of(103.0), of(200.0)];
-        let found = |points: &[(f64, &[ReportCell])]| turn("wide", points.iter().collect());
+        let found = |points: &[(f64, &[ReportCell])]| crossover("wide", points.iter().collect());
         // Half the time at 400 items, twice the time at 100: equal at 200.
         let first = found(&[(400.0, &here), (100.0, &slower), (10.0, &of(900.0))]).unwrap();
         assert_eq!(
@@ -352,13 +352,13 @@ mod tests {
             bounds: Vec::new(),
             twin: None,
         };
-        let changed = |axis, reached| Changed {
+        let changed = |axis, reached| VariedWorkload {
             axis: Some(axis),
             value: reached,
             reached,
             known: None,
         };
-        let beside = Beside {
+        let beside = ExtraWorkloads {
             contenders: vec!["wide".to_owned()],
             here: [Some(400.0), Some(0.02), None],
             changed: vec![
@@ -366,7 +366,7 @@ mod tests {
                 changed(Axis::ShareInView, 0.5),
                 changed(Axis::ShareInView, 0.001),
             ],
-            ..Beside::default()
+            ..ExtraWorkloads::default()
         };
         let groups = [group(200.0), group(150.0), group(10.0)];
         let here = group(50.0).cells;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::case::{AdviseInput, SCAN, TREE};
-use super::trials::{Answered, Trials, is_longer, of_costs};
+use super::trials::{CheckedAnswers, Trials, is_longer, of_costs};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, UpdatePolicy};
@@ -195,7 +195,7 @@ impl TestChoice {
         structure: String,
         draw_ns: f64,
         tests: &[(CullingTest, usize)],
-        answered: &Answered,
+        answered: &CheckedAnswers,
         times: &OverProcesses,
     ) -> TestChoice {
         let rows = tests.iter().map(|&(test, task)| {
@@ -272,32 +272,32 @@ impl MotionChoice {
     /// Choice before its measurement, and the label of the rebuilds to measure.
     ///
     /// No label if policies of `--update` are rows of the run.
-    pub(super) fn begun(
+    pub(super) fn start(
         input: &AdviseInput,
         structure: &StructureChoice,
     ) -> (MotionChoice, Option<String>) {
         let mut all = input.setting.structures.iter();
         let are_rows = all.clone().any(|s| s.policy != UpdatePolicy::Refit);
         let spec = all.find(|s| structure.name.as_ref() == Some(&s.label));
-        let mut begun = MotionChoice {
+        let mut choice = MotionChoice {
             refits: spec.is_none_or(|spec| spec.info().refits),
             ..MotionChoice::default()
         };
-        let spec = spec.filter(|_| begun.refits && !are_rows);
+        let spec = spec.filter(|_| choice.refits && !are_rows);
         let rebuilt = spec.zip(structure.rows.first()).and_then(|(spec, row)| {
             let builds = row.value("build_ms").unwrap_or(0.0) * 1e6;
             if builds > RULED_OUT * ns(row).unwrap_or(f64::INFINITY) {
                 let frames = builds / ns(row).unwrap_or(f64::INFINITY);
-                begun.ruled_out.push(("rebuild".to_owned(), frames));
+                choice.ruled_out.push(("rebuild".to_owned(), frames));
                 return None;
             }
             Some(format!("{}@rebuild", spec.label))
         });
-        (begun, rebuilt)
+        (choice, rebuilt)
     }
 
     /// Chooses among the cells of the chosen structure under several policies.
-    pub(super) fn chosen(self, structure: &StructureChoice, cells: &[ReportCell]) -> MotionChoice {
+    pub(super) fn choose(self, structure: &StructureChoice, cells: &[ReportCell]) -> MotionChoice {
         let alone = |label: &str| label.split('@').next().map(str::to_owned);
         let taken = structure.name.as_deref().and_then(alone);
         let own = cells.iter().filter(|cell| alone(&cell.structure) == taken);
@@ -324,7 +324,7 @@ pub fn policy_of(label: &str) -> &str {
 mod tests {
     use serde_json::json;
 
-    use super::super::case::planned;
+    use super::super::case::spec_of;
     use super::*;
     use crate::index::{Registry, UpdatePolicy};
     use crate::measure::{Metric, ProcessTimes};
@@ -488,9 +488,9 @@ mod tests {
             "linear",
             "octree@every=10",
         ] {
-            assert_eq!(planned(&structures, name).label, name);
+            assert_eq!(spec_of(&structures, name).label, name);
         }
-        let every = planned(&structures, "octree@every=10").policy;
+        let every = spec_of(&structures, "octree@every=10").policy;
         assert_eq!(every, UpdatePolicy::Every(10));
     }
 }

@@ -14,10 +14,10 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 pub use case::AdviseInput;
-pub use change::{Axis, Beside};
+pub use change::{Axis, ExtraWorkloads};
 pub use choice::{MotionChoice, StructureChoice, TestChoice, TestRow, ns, policy_of};
 pub use rule::{Advice, Omission};
-pub use trials::{Check, Side};
+pub use trials::{PairResult, TaskResult};
 
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
@@ -27,9 +27,9 @@ use crate::measure::{
 use crate::motion::Motion;
 
 use case::Case;
-use rule::{Draft, Finding, Rule};
+use rule::{EnteredRule, Finding, Rule};
 use rules::{RULES, input as stages};
-use trials::{Answered, BASE, Trials};
+use trials::{BASE, CheckedAnswers, Trials};
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -39,22 +39,22 @@ pub struct TrialPlan {
     schedule: Schedule,
     /// Expected answers by task and camera.
     expected: Vec<Vec<Answer>>,
-    beside: Beside,
+    beside: ExtraWorkloads,
     /// Plan of the stages, if the scene and the cameras allow it.
     stages: Option<FunnelPlan>,
 }
 
 /// Advice whose answers are compared, but which is not timed.
-pub struct Prepared {
+pub struct UntimedAdvice {
     /// Tasks and schedule for all processes.
     pub plan: TrialPlan,
-    entered: Entered,
-    answered: Answered,
+    entered: RuleTasks,
+    answered: CheckedAnswers,
     /// Counts of the additional workloads.
     counted: Vec<Part>,
     structure: StructureChoice,
     motion: Option<MotionChoice>,
-    funnel: Result<funnel::Prepared, String>,
+    funnel: Result<funnel::UntimedFunnel, String>,
 }
 
 /// Runs every rule with and without its feature, most on the fastest tree.
@@ -67,7 +67,7 @@ pub fn prepare(
     input: &AdviseInput,
     cells: Vec<ReportCell>,
     progress: &dyn Fn(&str),
-) -> Result<Prepared> {
+) -> Result<UntimedAdvice> {
     let Setting { scene, path, .. } = input.setting;
     let workload = input.workload()?;
     let structure = StructureChoice::of(&cells);
@@ -77,10 +77,10 @@ pub fn prepare(
     let moved = workload.motion.as_ref().map(Motion::share);
     let here = [Some(items), visible.map(|count| count / items), moved];
     let contenders = structure.contenders(moved.is_some());
-    let begun = (workload.motion.as_ref()).map(|_| MotionChoice::begun(input, &structure));
-    let (motion, rebuilt) = begun.unzip();
+    let choice = (workload.motion.as_ref()).map(|_| MotionChoice::start(input, &structure));
+    let (motion, rebuilt) = choice.unzip();
     let labels = (contenders, rebuilt.flatten());
-    let (beside, counted) = Beside::plan(input, labels, here, progress);
+    let (beside, counted) = ExtraWorkloads::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
     let mut trials = Trials::new(&case);
     let entered = enter(&mut trials, progress)?;
@@ -89,7 +89,7 @@ pub fn prepare(
     let tasks = trials.tasks(&answered.answers);
     let funnel = funnel::prepare(&stages(input.setting, &case.spec), progress);
     let funnel = funnel.map_err(|error| error.to_string());
-    Ok(Prepared {
+    Ok(UntimedAdvice {
         plan: TrialPlan {
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, &input.setting.protocol),
@@ -128,7 +128,7 @@ pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
     Ok(times)
 }
 
-impl Prepared {
+impl UntimedAdvice {
     /// Derives the advice from the times of all processes.
     pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
@@ -141,7 +141,7 @@ impl Prepared {
         let changes = beside.changes(duel.unwrap_or(&structure.rows), &groups);
         let rebuilds = duel.filter(|_| beside.rebuilt.is_some());
         let policies = rebuilds.unwrap_or(&structure.rows);
-        let motion = (self.motion).map(|motion| motion.chosen(&structure, policies));
+        let motion = (self.motion).map(|motion| motion.choose(&structure, policies));
         // The times of the stages follow those of the tasks.
         let tasks = self.plan.expected.len();
         let of_stages = processes.iter().map(|process| ProcessTimes {
@@ -162,33 +162,33 @@ impl Prepared {
             funnel,
         };
         let rules = self.entered.rules.into_iter();
-        let settled = rules.map(|(rule, draft)| {
-            let check = draft.sides.map(|sides| sides.check(answered, &times));
-            let finding = (draft.conclude)(&advice, check.as_ref());
+        let omissions = rules.map(|(rule, entered)| {
+            let check = entered.sides.map(|sides| sides.check(answered, &times));
+            let finding = (entered.conclude)(&advice, check.as_ref());
             rule.omission(finding, check)
         });
-        advice.omissions = settled.collect();
+        advice.omissions = omissions.collect();
         advice
     }
 }
 
 /// All tasks, in the order in which every process adds them.
-struct Entered {
+struct RuleTasks {
     tests: Vec<(CullingTest, usize)>,
-    rules: Vec<(&'static Rule, Draft)>,
+    rules: Vec<(&'static Rule, EnteredRule)>,
     twin: usize,
 }
 
-fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<Entered> {
+fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
         // A rule whose tasks cannot be added does not apply.
-        let draft = (rule.enter)(trials);
-        let none = |error: anyhow::Error| Draft::new(None, Finding::none(error.to_string()));
-        rules.push((rule, draft.unwrap_or_else(none)));
+        let entered = (rule.enter)(trials);
+        let none = |error: anyhow::Error| EnteredRule::new(None, Finding::none(error.to_string()));
+        rules.push((rule, entered.unwrap_or_else(none)));
     }
-    Ok(Entered {
+    Ok(RuleTasks {
         tests: choice::enter_tests(trials)?,
         twin: trials.add_base(),
         rules,

@@ -5,10 +5,10 @@ use std::rc::Rc;
 use anyhow::bail;
 use glam::DVec3;
 
-use super::case::{NO_NODES, TOLERANCE, part_of};
+use super::case::{NO_NODES, TOLERANCE, subset};
 use super::choice::TestChoice;
-use super::rule::{Draft, Finding};
-use super::trials::{BASE, Sides, Trials};
+use super::rule::{EnteredRule, Finding};
+use super::trials::{BASE, TaskPair, Trials};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
@@ -19,12 +19,12 @@ use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryVolume, Sorted, p
 use crate::shown::{count, counted, significant};
 
 /// Share of the planes above which the saving is not significant.
-const MOST_NEEDED: f64 = 0.99;
+const MAX_NEEDED: f64 = 0.99;
 
 /// Rule: planes with the whole scene on their inner side are not needed.
 ///
 /// Mostly far planes, which paths often put behind the scene.
-pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
     let bounds = &case.workload.scene.bounds;
     let (mut needed, mut all) = (0, 0);
@@ -41,9 +41,10 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
     // Two sides with the same planes would only differ by noise.
     let sides = (inside > 0).then(|| {
         let left_out = trials.index(&*case.index, fewer);
-        Sides::new(&case.spec.label, BASE, left_out)
+        TaskPair::new(&case.spec.label, BASE, left_out)
     });
-    Ok(Draft::new(sides, Finding::new(share, MOST_NEEDED, reason)))
+    let finding = Finding::new(share, MAX_NEEDED, reason);
+    Ok(EnteredRule::new(sides, finding))
 }
 
 /// Removes the planes that contain the bounds.
@@ -60,20 +61,20 @@ fn without_needless(volume: &ConvexVolume, bounds: &Aabb) -> ConvexVolume {
 /// Least share of the plane tests that masks must save.
 ///
 /// A small tree saves a few percent, and carrying masks has a cost.
-const LEAST_SAVED: f64 = 0.1;
+const MIN_SAVED: f64 = 0.1;
 /// Cameras whose plane tests are counted.
-const COUNTED: usize = 64;
+const COUNTED_CAMERAS: usize = 64;
 
 /// Rule: plane masks, which skip planes that contain a node in its subtree.
 ///
 /// The side without masks is a view that leaves all planes open unless all are closed.
-pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
     let kernel = case.spec.execution.kernel;
     let input = Input::new(&case.workload.scene.items);
     let tree = Rc::new(Wide::build(&input, &Default::default())?);
     let volumes: Rc<[ConvexVolume]> = case.volumes().cloned().collect();
-    let step = volumes.len().div_ceil(COUNTED).max(1);
+    let step = volumes.len().div_ceil(COUNTED_CAMERAS).max(1);
     let (mut fewer, mut all) = (0, 0);
     for volume in volumes.iter().step_by(step) {
         fewer += tree.counted(volume).1.planes_tested;
@@ -83,15 +84,15 @@ pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     if all > 0 {
         let [left, tests] = [fewer, all].map(|tests| count(tests as usize));
         let reason = format!("masks leave {left} of {tests} tests");
-        finding = Finding::new(1.0 - fewer as f64 / all as f64, LEAST_SAVED, reason);
+        finding = Finding::new(1.0 - fewer as f64 / all as f64, MIN_SAVED, reason);
     }
     let (other, views) = (tree.clone(), volumes.clone());
-    let kept = trials.enter(true, move |n, out| see(kernel, &tree, &volumes[n], out));
+    let kept = trials.enter(true, move |n, out| query(kernel, &tree, &volumes[n], out));
     let left_out = trials.enter(true, move |n, out| {
-        see(kernel, &other, &Unmasked(&views[n]), out)
+        query(kernel, &other, &Unmasked(&views[n]), out)
     });
-    let sides = Sides::new(Wide::INFO.name, kept, left_out);
-    Ok(Draft::concluded(sides, |advice, _| {
+    let sides = TaskPair::new(Wide::INFO.name, kept, left_out);
+    Ok(EnteredRule::concluded(sides, |advice, _| {
         match advice.structure.is_scan() {
             true => Finding::none(NO_NODES),
             false => finding,
@@ -99,7 +100,7 @@ pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<Draft> {
     }))
 }
 
-fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
+fn query<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
     let recorder = &mut NoRecorder;
     // A Vec never breaks off.
     let _ = kernel.run(Query {
@@ -145,10 +146,10 @@ impl QueryVolume for Unmasked<'_> {
 /// Rule: axes beyond the six planes, from the volume's own box and silhouettes.
 ///
 /// The exact test adds them. They cost test time and save the drawing of false positives.
-pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn six_planes(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
     let sides = against_base(trials, &exact)?;
-    Ok(Draft::concluded(sides, move |advice, check| {
+    Ok(EnteredRule::concluded(sides, move |advice, check| {
         let sides = check.map(|check| [&check.kept, &check.left_out]);
         let more = sides.and_then(|[exact, six]| {
             Some(six.false_positives_per_query? - exact.false_positives_per_query?)
@@ -159,12 +160,12 @@ pub fn six_planes(trials: &mut Trials) -> anyhow::Result<Draft> {
         let draw_ns = advice.draw_ns;
         let reason = format!("with {} ns/item drawn", significant(draw_ns));
         let finding = Finding::new(more * draw_ns, exact.ns - six.ns, reason);
-        following(finding, &advice.test)
+        with_choice(finding, &advice.test)
     }))
 }
 
 /// Decides as the chosen test, which has these axes or has not.
-fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
+fn with_choice(mut finding: Finding, choice: &TestChoice) -> Finding {
     let Some(taken) = choice.name else {
         return finding;
     };
@@ -183,23 +184,23 @@ fn following(mut finding: Finding, choice: &TestChoice) -> Finding {
 }
 
 /// Compares the tree with another culling's views and the tree with default views.
-fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<Sides> {
+fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<TaskPair> {
     let case = trials.case;
     let views = case.views_by(culling)?;
     let kept = trials.index(case.tree_for(culling.test)?, views);
-    Ok(Sides::new(&case.spec.label, kept, BASE))
+    Ok(TaskPair::new(&case.spec.label, kept, BASE))
 }
 
 /// Rule: the plane test in f64.
 ///
 /// f32 planes, moved outward for their rounding, miss nothing either, and their margin is usually
 /// far too thin to contain an item.
-pub fn f64_kernel(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn f64_kernel(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
     let finding = of_margin(case.margin(&case.workload.around));
-    Ok(Draft::new(against_base(trials, &in_f64)?, finding))
+    Ok(EnteredRule::new(against_base(trials, &in_f64)?, finding))
 }
 
 fn of_margin(margin: f64) -> Finding {
@@ -214,7 +215,7 @@ fn of_margin(margin: f64) -> Finding {
 ///
 /// Near the world's origin f32 has enough digits without. One side has the scene about its centre,
 /// the other about the world's origin.
-pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
+pub fn rebasing(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
     let scene = case.workload.scene;
     if case.workload.around != scene.surroundings() {
@@ -224,7 +225,7 @@ pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     let bounds = scene.world_bounds();
     let centre = bounds.min / 2.0 + bounds.max / 2.0;
     let elsewhere = if is_moved { DVec3::ZERO } else { centre };
-    let other = part_of(scene, elsewhere, scene.items.len())?;
+    let other = subset(scene, elsewhere, scene.items.len())?;
     let workload = Workload::new(&other, case.path, &Culling::default());
     let views = workload?.views;
     let (at_zero, moved) = match is_moved {
@@ -237,14 +238,14 @@ pub fn rebasing(trials: &mut Trials) -> anyhow::Result<Draft> {
     }
     let there = trials.index(case.spec.build(&other.items)?, views);
     let [kept, left_out] = [[there, BASE], [BASE, there]][usize::from(is_moved)];
-    let sides = Sides::new(&case.spec.label, kept, left_out);
-    Ok(Draft::new(sides, of_margin(margin)))
+    let sides = TaskPair::new(&case.spec.label, kept, left_out);
+    Ok(EnteredRule::new(sides, of_margin(margin)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::rule::some_rule;
-    use super::super::trials::{By, Decision};
+    use super::super::trials::{Basis, Decision};
     use super::*;
     use crate::geometry::Plane;
     use glam::Vec3;
@@ -292,8 +293,8 @@ mod tests {
             out.sort_unstable();
             let mut timed = Vec::new();
             match masked {
-                true => see(Kernel::best(), &tree, &volume, &mut timed),
-                false => see(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
+                true => query(Kernel::best(), &tree, &volume, &mut timed),
+                false => query(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
             }
             timed.sort_unstable();
             assert_eq!(timed, out);
@@ -327,7 +328,7 @@ mod tests {
                     rows: Vec::new(),
                 };
                 let settled = |choice: &TestChoice| {
-                    some_rule(By::Rule).omission(following(finding.clone(), choice), None)
+                    some_rule(Basis::Rule).omission(with_choice(finding.clone(), choice), None)
                 };
                 let omission = settled(&choice);
                 let found = (omission.decision, omission.is_tie);

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::change::Change;
 use super::choice::{MotionChoice, StructureChoice, TestChoice};
-use super::trials::{By, Check, Decision, Sides, Trials, is_longer, of_costs};
+use super::trials::{Basis, Decision, PairResult, TaskPair, Trials, is_longer, of_costs};
 use crate::funnel::FunnelReport;
 use crate::statistics::Estimate;
 
@@ -23,10 +23,10 @@ pub struct Rule {
     /// The rule leaves the work out if the statistic is at most the threshold.
     pub statistic_name: &'static str,
     #[serde(skip)]
-    pub(super) by: By,
+    pub(super) basis: Basis,
     /// Adds the tasks of both sides.
     #[serde(skip)]
-    pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<Draft>,
+    pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<EnteredRule>,
 }
 
 /// Structure, test and features to leave out, with the evidence.
@@ -79,7 +79,7 @@ pub struct Finding {
     /// Choice or measurement that overrides rule and clock.
     pub leaves_out: Option<bool>,
     /// Measurement of a rule without tasks of its own.
-    pub check: Option<Check>,
+    pub check: Option<PairResult>,
 }
 
 impl Finding {
@@ -100,26 +100,26 @@ impl Finding {
 }
 
 /// Makes a finding from the advice so far and the rule's own measurement.
-type Conclude = dyn FnOnce(&Advice, Option<&Check>) -> Finding;
+type Conclude = dyn FnOnce(&Advice, Option<&PairResult>) -> Finding;
 
 /// A rule with its tasks added, before its times.
-pub struct Draft {
-    pub sides: Option<Sides>,
+pub struct EnteredRule {
+    pub sides: Option<TaskPair>,
     pub conclude: Box<Conclude>,
 }
 
-impl Draft {
+impl EnteredRule {
     /// Draft whose finding does not depend on times.
-    pub fn new(sides: impl Into<Option<Sides>>, finding: Finding) -> Draft {
-        Draft::concluded(sides, move |_, _| finding)
+    pub fn new(sides: impl Into<Option<TaskPair>>, finding: Finding) -> EnteredRule {
+        EnteredRule::concluded(sides, move |_, _| finding)
     }
 
     /// Draft whose finding depends on the advice so far and the rule's measurement.
     pub fn concluded(
-        sides: impl Into<Option<Sides>>,
-        conclude: impl FnOnce(&Advice, Option<&Check>) -> Finding + 'static,
-    ) -> Draft {
-        Draft {
+        sides: impl Into<Option<TaskPair>>,
+        conclude: impl FnOnce(&Advice, Option<&PairResult>) -> Finding + 'static,
+    ) -> EnteredRule {
+        EnteredRule {
             sides: sides.into(),
             conclude: Box::new(conclude),
         }
@@ -128,7 +128,7 @@ impl Draft {
 
 impl Rule {
     /// Combines statistic, clock and answers; keeps work without which items are lost.
-    pub fn omission(&'static self, finding: Finding, check: Option<Check>) -> Omission {
+    pub fn omission(&'static self, finding: Finding, check: Option<PairResult>) -> Omission {
         let check = check.or(finding.check);
         let timed = check.as_ref().map(|c| [c.kept.ns, c.left_out.ns]);
         let cost_ns = finding.cost_ns.or(timed);
@@ -152,7 +152,7 @@ impl Rule {
             check,
         };
         let check = omission.check.as_ref();
-        let by_clock = check.filter(|_| self.by == By::Time);
+        let by_clock = check.filter(|_| self.basis == Basis::Time);
         let by_clock = by_clock.and_then(|check| is_longer(check.ratio?));
         let is_lost = omission.loses_items();
         let compared = finding.compared;
@@ -191,13 +191,13 @@ pub struct Omission {
     /// Total cost with the work and without it, ns.
     pub cost_ns: Option<[f64; 2]>,
     /// Measurement with and without the work; null without one.
-    pub check: Option<Check>,
+    pub check: Option<PairResult>,
 }
 
 impl Omission {
     /// Returns yes, no, or either for a tie; empty if the rule does not apply.
     pub fn answer(&self) -> &'static str {
-        let by_cost = self.rule.by != By::Error && !self.loses_items();
+        let by_cost = self.rule.basis != Basis::Error && !self.loses_items();
         match self.decision {
             Decision::NotApplicable => "",
             _ if self.is_tie && by_cost => "either",
@@ -208,13 +208,14 @@ impl Omission {
 
     /// Returns `true` if items are missed without the work, or the sides differ.
     fn loses_items(&self) -> bool {
-        let misses_more = |c: &Check| c.left_out.false_negative_ppm > c.kept.false_negative_ppm;
-        self.check.as_ref().is_some_and(misses_more) || self.is_wrong()
+        let misses = |c: &PairResult| c.left_out.false_negative_ppm > c.kept.false_negative_ppm;
+        self.check.as_ref().is_some_and(misses) || self.is_wrong()
     }
 
     /// Returns `true` if two sides that must agree did not.
     pub fn is_wrong(&self) -> bool {
-        let check = self.check.as_ref().filter(|_| self.rule.by == By::Time);
+        let by_time = self.rule.basis == Basis::Time;
+        let check = self.check.as_ref().filter(|_| by_time);
         check.is_some_and(|check| !check.same_answers)
     }
 }
@@ -227,13 +228,13 @@ mod tests {
     use super::*;
 
     /// A rule without tasks.
-    pub fn some_rule(by: By) -> &'static Rule {
+    pub fn some_rule(basis: Basis) -> &'static Rule {
         Box::leak(Box::new(Rule {
             name: "rule",
             left_out: "something",
             statistic_name: "its size",
-            by,
-            enter: |_| Ok(Draft::new(None, Finding::default())),
+            basis,
+            enter: |_| Ok(EnteredRule::new(None, Finding::default())),
         }))
     }
 }

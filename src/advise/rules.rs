@@ -10,9 +10,9 @@ use super::case::{NO_NODES, TOLERANCE, default_of};
 use super::change::Axis;
 use super::choice::{ns, over, policy_of};
 use super::planes;
-use super::rule::{Draft, Finding, Rule};
-use super::trials::By::{Error, Rule as Statistic, Time};
-use super::trials::{BASE, Check, Sides, Trials};
+use super::rule::{EnteredRule, Finding, Rule};
+use super::trials::Basis::{Error, Rule as Statistic, Time};
+use super::trials::{BASE, PairResult, TaskPair, Trials};
 use crate::drift::walk;
 use crate::funnel::StageKind::{self, Occlusion, Region, Triangle};
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE};
@@ -23,7 +23,7 @@ use crate::visibility::SampleGrid;
 
 /// All rules: name, work to leave out; statistic; decision.
 pub(super) const RULES: &[Rule] = rows! {
-    Rule { name, left_out, statistic_name, by, enter }
+    Rule { name, left_out, statistic_name, basis, enter }
     "needless-planes", "all six planes",
         "share of all planes that the n-vertex of the scene's bounds is not inside of",
         Time, planes::needless_planes;
@@ -54,15 +54,15 @@ pub(super) const RULES: &[Rule] = rows! {
 /// Rule: the index itself; below some number of items a scan is as fast.
 ///
 /// The number follows from measurements on parts of the scene ([`Axis::Items`]).
-fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
+fn no_index(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
     let items = &case.workload.scene.items;
     let whole = trials.index(case.scan.build(items)?, &case.workload.views[..]);
     let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
-    let sides = Sides::new(format!("{tree} against {scan}{place}"), BASE, whole);
+    let sides = TaskPair::new(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
-    Ok(Draft::concluded(sides, move |advice, check| {
+    Ok(EnteredRule::concluded(sides, move |advice, check| {
         let taken = &advice.structure;
         // Follows the chosen structure if there was a choice.
         let [tree, fastest] = taken.tree_and_scan();
@@ -72,7 +72,7 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
         let alone = check.filter(|_| costs.is_none());
         let change = advice.changes.iter().find(|c| c.axis == Axis::Items);
         let below = change.and_then(|change| change.below.as_ref());
-        let wins = |check: &Check| check.left_out.ns <= check.kept.ns;
+        let wins = |check: &PairResult| check.left_out.ns <= check.kept.ns;
         let scan_wins = alone.map_or(taken.is_scan(), wins);
         // Smaller parts are not measured once another structure is faster.
         let measured = change.map(|change| change.measured[0]);
@@ -105,10 +105,10 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<Draft> {
 ///
 /// An octree's third split separates nothing in a scene that is flatter than a quadtree's leaves
 /// are wide. Bounds stay three-dimensional either way.
-fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
+fn third_dimension(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let case = trials.case;
-    let (scene, by) = (case.workload.scene, case.spec.execution);
-    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
+    let (scene, execution) = (case.workload.scene, case.spec.execution);
+    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, execution));
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
     let mut extents = extent.to_array();
@@ -117,8 +117,8 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
     let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
         .map(|index| trials.index(index, &case.workload.views[..]));
-    let sides = Sides::new("octree against quadtree", kept, left_out);
-    Ok(Draft::concluded(sides, move |advice, _| {
+    let sides = TaskPair::new("octree against quadtree", kept, left_out);
+    Ok(EnteredRule::concluded(sides, move |advice, _| {
         if advice.structure.is_scan() {
             return Finding::none(NO_NODES);
         }
@@ -136,8 +136,8 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<Draft> {
 /// Rule: a rebuild in every frame of a motion, compared with refits only.
 ///
 /// A refit keeps the tree and is faster, but queries of the refitted tree are slower.
-fn rebuild() -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, |advice, _| {
+fn rebuild() -> anyhow::Result<EnteredRule> {
+    Ok(EnteredRule::concluded(None, |advice, _| {
         let Some(motion) = &advice.motion else {
             return Finding::none("nothing moves without --motion");
         };
@@ -159,7 +159,7 @@ fn rebuild() -> anyhow::Result<Draft> {
             return Finding::none("not both policies were measured");
         };
         let (on, ratio) = (&refitted.structure, over(rebuilt, refitted));
-        let check = Check::of_times(format!("frames of {on}"), [kept, left_out], ratio);
+        let check = PairResult::of_times(format!("frames of {on}"), [kept, left_out], ratio);
         Finding {
             check: Some(check),
             ..Finding::new(left_out, kept, "rebuilt in every frame")
@@ -172,7 +172,7 @@ fn rebuild() -> anyhow::Result<Draft> {
 /// Axes in f32 that are rotated and never corrected drift by some 5e-8 per step; a walk of as many
 /// steps as the path has cameras measures the error. A basis that is built for each camera
 /// does not need the correction.
-fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
+fn frame_correction(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let path = trials.case.path;
     let steps = path.cameras.len() + path.left_out;
     let [(error, without), (_, with)] =
@@ -182,8 +182,8 @@ fn frame_correction(trials: &mut Trials) -> anyhow::Result<Draft> {
     let error = error.unwrap_or(f64::INFINITY);
     let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
     let finding = Finding::new(error, TOLERANCE, reason);
-    let sides = Sides::new("500 steps of a frame", kept, left_out);
-    Ok(Draft::new(sides, finding))
+    let sides = TaskPair::new("500 steps of a frame", kept, left_out);
+    Ok(EnteredRule::new(sides, finding))
 }
 
 /// Most views, and most items in all views together.
@@ -205,8 +205,8 @@ pub fn input<'s>(setting: &'s Setting, tree: &'s StructureSpec) -> FunnelInput<'
 }
 
 /// Rule about a stage; does not apply if the funnel lacks the stage.
-fn reads(stage: StageKind) -> anyhow::Result<Draft> {
-    Ok(Draft::concluded(None, move |advice, _| {
+fn reads(stage: StageKind) -> anyhow::Result<EnteredRule> {
+    Ok(EnteredRule::concluded(None, move |advice, _| {
         let funnel = advice.funnel.as_ref().map_err(String::clone);
         let found = funnel.and_then(|funnel| finding(funnel, stage, advice.draw_ns));
         found.unwrap_or_else(Finding::none)
@@ -225,15 +225,15 @@ fn finding(funnel: &FunnelReport, stage: StageKind, draw_ns: f64) -> Result<Find
     let items = gain(StageKind::Occlusion).map_or(f64::NAN, |gain| gain.with_count);
     let of_item = own.without_count / items;
     Ok(match stage {
-        StageKind::Triangle => weigh(own, "triangle", draw_ns / of_item),
-        _ => weigh(own, "item", draw_ns),
+        StageKind::Triangle => gain_finding(own, "triangle", draw_ns / of_item),
+        _ => gain_finding(own, "item", draw_ns),
     })
 }
 
 /// Leaves a stage out if it takes longer than drawing what it removes.
 ///
 /// A candidate (`one`) that is not removed costs `cost_ns`.
-fn weigh(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
+fn gain_finding(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
     let (with, without) = (gain.with_count, gain.without_count);
     if without == 0.0 {
         return Finding::none(format!("no {one} is in any view that was looked at"));
@@ -249,9 +249,9 @@ fn weigh(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
     let (cost, pays_from) = (significant(cost_ns), pays_from.unwrap_or_default());
     let reason = format!("{cost} ns/{one}{pays_from}");
     let on = format!("{} {}, as in funnel", gain.stage.name(), gain.back_end);
-    let check = Check {
+    let check = PairResult {
         same_answers: gain.unit == "fragments" || removed == 0.0,
-        ..Check::of_times(on, [kept_ns, left_out_ns], gain.ratio)
+        ..PairResult::of_times(on, [kept_ns, left_out_ns], gain.ratio)
     };
     Finding {
         check: Some(check),
@@ -263,7 +263,7 @@ fn weigh(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::super::rule::{Omission, some_rule};
-    use super::super::trials::{By, Decision};
+    use super::super::trials::{Basis, Decision};
     use super::*;
     use crate::statistics::Estimate;
 
@@ -272,7 +272,7 @@ mod tests {
         let named = ("rays", "items");
         let mut gain = Gain::new(StageKind::Occlusion, named, counts, Default::default());
         (gain.without_ns, gain.ratio) = (Some(100.0), Some(Estimate::exact(ratio)));
-        some_rule(By::Rule).omission(weigh(&gain, "thing", cost_ns), None)
+        some_rule(Basis::Rule).omission(gain_finding(&gain, "thing", cost_ns), None)
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub struct Trials<'c> {
 }
 
 /// Answers of all tasks.
-pub struct Answered {
+pub struct CheckedAnswers {
     /// Answers by task and camera.
     pub answers: Vec<Vec<Answer>>,
     /// Errors by camera with a truth, for tasks that are compared with it.
@@ -50,9 +50,9 @@ impl<'c> Trials<'c> {
 
     /// Adds a task; returns its index.
     ///
-    /// `is_judged` is true if its answers are items in view, to be compared with the truth.
-    pub fn enter(&mut self, is_judged: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
-        self.asks.push((Box::new(ask), is_judged));
+    /// `is_checked` is true if its answers are items in view, to be compared with the truth.
+    pub fn enter(&mut self, is_checked: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
+        self.asks.push((Box::new(ask), is_checked));
         self.asks.len() - 1
     }
 
@@ -68,11 +68,11 @@ impl<'c> Trials<'c> {
     }
 
     /// Runs every task for every camera, and compares the answers with the truth.
-    pub fn answered(&self) -> Answered {
+    pub fn answered(&self) -> CheckedAnswers {
         let truths = self.case.truths();
         let mut out: Vec<ItemId> = Vec::new();
-        let answered = self.asks.iter().map(|(ask, is_judged)| {
-            let mut errors = is_judged.then(Vec::new);
+        let answered = self.asks.iter().map(|(ask, is_checked)| {
+            let mut errors = is_checked.then(Vec::new);
             let mut truths = truths.iter().peekable();
             let answers = (0..self.case.workload.views.len()).map(|camera| {
                 out.clear();
@@ -87,7 +87,7 @@ impl<'c> Trials<'c> {
             (answers, errors)
         });
         let (answers, errors) = answered.unzip();
-        Answered { answers, errors }
+        CheckedAnswers { answers, errors }
     }
 
     /// All tasks, to be timed.
@@ -101,7 +101,7 @@ impl<'c> Trials<'c> {
     }
 }
 
-impl Answered {
+impl CheckedAnswers {
     /// Errors of a task, summed over the cameras with a truth.
     pub fn errors(&self, task: usize) -> Option<ErrorCount> {
         Some(self.by_camera(task)?.iter().copied().sum())
@@ -120,15 +120,15 @@ impl Answered {
 }
 
 /// Two sides of a check, by the indices of their tasks.
-pub struct Sides {
+pub struct TaskPair {
     on: String,
     kept: usize,
     left_out: usize,
 }
 
-impl Sides {
-    pub fn new(on: impl ToString, kept: usize, left_out: usize) -> Sides {
-        Sides {
+impl TaskPair {
+    pub fn new(on: impl ToString, kept: usize, left_out: usize) -> TaskPair {
+        TaskPair {
             on: on.to_string(),
             kept,
             left_out,
@@ -136,17 +136,17 @@ impl Sides {
     }
 
     /// Measured check; NaN if a task has no time, after a panic.
-    pub fn check(self, answered: &Answered, times: &OverProcesses) -> Check {
+    pub fn check(self, answered: &CheckedAnswers, times: &OverProcesses) -> PairResult {
         let side = |task| {
             let errors = answered.errors(task);
-            Side {
+            TaskResult {
                 ns: times.ns(task).map_or(f64::NAN, |found| found.value),
                 excess: errors.and_then(|e| e.excess()),
                 false_positives_per_query: answered.false_positives_per_query(task),
                 false_negative_ppm: errors.and_then(|e| e.false_negative_ppm()),
             }
         };
-        Check {
+        PairResult {
             kept: side(self.kept),
             left_out: side(self.left_out),
             ratio: times.ratio(self.kept, self.left_out),
@@ -160,15 +160,15 @@ impl Sides {
 ///
 /// The layout of memory and code alone makes differences of some percent, which the next run on the
 /// same machine may reverse.
-pub(super) const TIE: f64 = 1.05;
+pub(super) const MIN_RATIO: f64 = 1.05;
 
 /// Returns `true` if a ratio shows its first time to be the longer one.
 ///
 /// `None` for a tie. Without an interval the value decides.
 pub(super) fn is_longer(ratio: Estimate) -> Option<bool> {
-    let is_clear = |[lower, upper]: [f64; 2]| lower > TIE || upper < 1.0 / TIE;
-    let is_told = ratio.ends().is_none_or(is_clear);
-    is_told.then_some(ratio.value > 1.0)
+    let is_clear = |[lower, upper]: [f64; 2]| lower > MIN_RATIO || upper < 1.0 / MIN_RATIO;
+    let is_significant = ratio.ends().is_none_or(is_clear);
+    is_significant.then_some(ratio.value > 1.0)
 }
 
 /// Ratio of two costs, from the ratio of the times that they include.
@@ -198,7 +198,7 @@ pub enum Decision {
 
 /// Criterion of a rule's decision.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum By {
+pub(super) enum Basis {
     /// Times decide if both sides give the same answers; the rule decides a tie.
     Time,
     /// The rule decides by a cost, as the sides differ in more than time.
@@ -209,13 +209,13 @@ pub(super) enum By {
 
 /// Times and answers with the work of a rule (kept) and without it (left out).
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Check {
+pub struct PairResult {
     /// Structure or work that was measured.
     pub on: String,
     /// Side with the work.
-    pub kept: Side,
+    pub kept: TaskResult,
     /// Side without it.
-    pub left_out: Side,
+    pub left_out: TaskResult,
     /// Time with it / time without: above 1, leaving out is faster.
     ///
     /// `None` without times.
@@ -227,7 +227,7 @@ pub struct Check {
 
 /// One side of a check; errors are null if not compared with the truth.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Side {
+pub struct TaskResult {
     /// Thread CPU time per camera, mean over cameras and processes, ns.
     pub ns: f64,
     /// False positives / visible items.
@@ -238,14 +238,14 @@ pub struct Side {
     pub false_negative_ppm: Option<f64>,
 }
 
-impl Check {
+impl PairResult {
     /// Check of times only, for two sides with the same answers.
-    pub(super) fn of_times(on: String, ns: [f64; 2], ratio: Option<Estimate>) -> Check {
-        let [kept, left_out] = ns.map(|ns| Side {
+    pub(super) fn of_times(on: String, ns: [f64; 2], ratio: Option<Estimate>) -> PairResult {
+        let [kept, left_out] = ns.map(|ns| TaskResult {
             ns,
-            ..Side::default()
+            ..TaskResult::default()
         });
-        Check {
+        PairResult {
             on,
             kept,
             left_out,
@@ -261,16 +261,16 @@ mod tests {
     use super::*;
 
     /// A check with a ratio of times and the misses of each side.
-    fn check(ratio: f64, missed: [f64; 2]) -> Check {
+    fn check(ratio: f64, missed: [f64; 2]) -> PairResult {
         let times = Some(Estimate::exact(ratio));
-        let mut check = Check::of_times("wide".to_owned(), [ratio * 100.0, 100.0], times);
+        let mut check = PairResult::of_times("wide".to_owned(), [ratio * 100.0, 100.0], times);
         check.kept.false_negative_ppm = Some(missed[0]);
         check.left_out.false_negative_ppm = Some(missed[1]);
         check
     }
 
-    fn settled(by: By, statistic: f64, check: Check) -> Omission {
-        some_rule(by).omission(Finding::new(statistic, 1.0, ""), Some(check))
+    fn settled(basis: Basis, statistic: f64, check: PairResult) -> Omission {
+        some_rule(basis).omission(Finding::new(statistic, 1.0, ""), Some(check))
     }
 
     #[test]
@@ -279,7 +279,7 @@ mod tests {
         let of = |statistic, ratio: f64, ends| {
             let mut check = check(ratio, [0.0; 2]);
             check.ratio = Some(Estimate::within(ratio, ends));
-            settled(By::Time, statistic, check).decision
+            settled(Basis::Time, statistic, check).decision
         };
         let (slower, faster) = ([1.1, 1.3], [0.7, 0.9]);
         assert_eq!(of(small, 1.2, slower), Decision::LeaveOut);
@@ -297,7 +297,7 @@ mod tests {
             for ratio in [1.5, 0.5] {
                 let mut check = check(ratio, [0.0; 2]);
                 check.same_answers = false;
-                let omission = settled(By::Rule, statistic, check);
+                let omission = settled(Basis::Rule, statistic, check);
                 assert!(omission.decision == wanted && !omission.is_wrong());
             }
         }
@@ -305,18 +305,18 @@ mod tests {
 
     #[test]
     fn a_tie_in_costs_leaves_the_choice_but_not_where_an_error_decides() {
-        let of = |by, statistic, missed: [f64; 2]| {
+        let of = |basis, statistic, missed: [f64; 2]| {
             let mut check = check(1.0, missed);
             check.ratio = Some(Estimate::within(1.0, [0.9, 1.1]));
-            settled(by, statistic, check).answer()
+            settled(basis, statistic, check).answer()
         };
-        for by in [By::Time, By::Rule] {
+        for by in [Basis::Time, Basis::Rule] {
             assert_eq!([0.5, 2.0].map(|size| of(by, size, [0.0; 2])), ["either"; 2]);
             assert_eq!(of(by, 0.5, [1.0, 2.0]), "yes");
         }
-        let by_error = [0.5, 2.0].map(|size| of(By::Error, size, [0.0; 2]));
+        let by_error = [0.5, 2.0].map(|size| of(Basis::Error, size, [0.0; 2]));
         assert_eq!(by_error, ["no", "yes"]);
-        let clear = settled(By::Rule, 2.0, check(1.5, [0.0; 2]));
+        let clear = settled(Basis::Rule, 2.0, check(1.5, [0.0; 2]));
         assert_eq!(clear.answer(), "yes");
     }
 
@@ -325,18 +325,19 @@ mod tests {
         let blind = check(6.0, [1.0, 2.0]);
         let mut other = check(6.0, [0.0; 2]);
         other.same_answers = false;
-        for (by, check) in [(By::Time, &blind), (By::Rule, &blind), (By::Time, &other)] {
+        let [time, rule] = [Basis::Time, Basis::Rule];
+        for (by, check) in [(time, &blind), (rule, &blind), (time, &other)] {
             let omission = settled(by, 0.5, check.clone());
             assert_eq!(omission.decision, Decision::Keep, "{check:?}");
             assert!(omission.reason.contains("missed"));
         }
-        let omission = settled(By::Time, 0.5, check(6.0, [2.0; 2]));
+        let omission = settled(Basis::Time, 0.5, check(6.0, [2.0; 2]));
         assert_eq!(omission.decision, Decision::LeaveOut);
     }
 
     #[test]
     fn a_rule_without_a_statistic_does_not_apply() {
-        let rule = some_rule(By::Time);
+        let rule = some_rule(Basis::Time);
         let omission = rule.omission(Finding::none("for a reason"), None);
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.statistic, omission.saving), (None, None));

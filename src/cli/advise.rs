@@ -13,7 +13,7 @@ use super::study::{Study, load, note_solid};
 use super::text::{self, significant, some, time_within};
 use super::{Ending, print};
 use crate::advise::{
-    self, Advice, AdviseInput, Axis, Check, Omission, Side, TestRow, ns, policy_of,
+    self, Advice, AdviseInput, Axis, Omission, PairResult, TaskResult, TestRow, ns, policy_of,
 };
 use crate::index::Registry;
 use crate::measure::{
@@ -320,8 +320,8 @@ fn features<'o>() -> [Column<&'o Omission>; 13] {
             })
         }),
         ("answers", |rule| {
-            let misses = |side: &Side| side.false_negative_ppm > Some(0.0);
-            let answers = |check: &Check| match check.same_answers {
+            let misses = |side: &TaskResult| side.false_negative_ppm > Some(0.0);
+            let answers = |check: &PairResult| match check.same_answers {
                 _ if rule.is_wrong() => "WRONG: not the same",
                 _ if misses(&check.kept) || misses(&check.left_out) => "some missed",
                 true => "the same",
