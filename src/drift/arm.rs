@@ -23,14 +23,14 @@ pub struct Arm {
 
 /// Target during one frame, as a function of the seconds since the frame began.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Line {
+pub struct TargetLine {
     /// Start time of the frame.
     pub start: f64,
     pub base: f64,
     pub speed: f64,
 }
 
-impl Line {
+impl TargetLine {
     #[inline(always)]
     pub fn at(&self, t: f64) -> f64 {
         self.base + t * self.speed
@@ -64,7 +64,7 @@ fn damped_pair(zeta: f64, angle: f64) -> (f64, f64) {
 }
 
 /// Position and velocity after `h` seconds, for a target at rest at zero.
-fn released(stiffness: f64, zeta: f64, [x, v]: State, h: f64) -> State {
+fn decayed(stiffness: f64, zeta: f64, [x, v]: State, h: f64) -> State {
     let omega = stiffness.sqrt();
     let (cosh, sinhc) = damped_pair(zeta, omega * h);
     let (rate, sinhc) = (zeta * omega, sinhc * h);
@@ -78,14 +78,14 @@ fn released(stiffness: f64, zeta: f64, [x, v]: State, h: f64) -> State {
 ///
 /// Behind a target of constant speed it settles `2 zeta/omega` seconds behind; its deviation from
 /// that decays as for a target at rest.
-pub fn chased(arm: &Arm, line: &Line, t: f64, [x, v]: State, h: f64) -> State {
+pub fn exact_linear(arm: &Arm, line: &TargetLine, t: f64, [x, v]: State, h: f64) -> State {
     let stretch = line.at(t) - x;
     let secant = arm.stiffness * (1.0 + arm.stiffening * stretch * stretch);
     let omega = secant.sqrt();
     let zeta = arm.friction / (2.0 * omega);
     let behind = 2.0 * zeta / omega;
     let steady = |t: f64| line.at(t) - behind * line.speed;
-    let [x, v] = released(secant, zeta, [x - steady(t), v - line.speed], h);
+    let [x, v] = decayed(secant, zeta, [x - steady(t), v - line.speed], h);
     [steady(t + h) + x, line.speed + v]
 }
 
@@ -104,29 +104,29 @@ named! {
 }
 
 /// An arm behind a target that is known at frames of equal length.
-pub struct Chase {
+pub struct ArmRun {
     pub arm: Arm,
     pub start: State,
-    pub frames: Vec<Line>,
+    pub bases: Vec<TargetLine>,
     /// Length of a frame.
     pub frame_s: f64,
 }
 
-impl Chase {
+impl ArmRun {
     /// A critically damped arm behind `sin t`, for `seconds` in frames at `rate_hz`.
-    pub fn new(kind: ArmKind, stiffness: f64, rate_hz: f64, seconds: f64) -> Chase {
+    pub fn new(kind: ArmKind, stiffness: f64, rate_hz: f64, seconds: f64) -> ArmRun {
         let (stiffening, stop, from) = match kind {
             ArmKind::Linear => (0.0, f64::INFINITY, 1.0),
             ArmKind::Collision => (1.0, 0.6, -1.0),
         };
-        let (frame_s, mut start, mut frames) = (1.0 / rate_hz, 0.0, Vec::new());
+        let (frame_s, mut start, mut bases) = (1.0 / rate_hz, 0.0, Vec::new());
         while start < seconds * (1.0 - 1e-9) {
             let (base, end) = (libm::sin(start), start + frame_s);
             let speed = (libm::sin(end) - base) / frame_s;
-            frames.push(Line { start, base, speed });
+            bases.push(TargetLine { start, base, speed });
             start = end;
         }
-        Chase {
+        ArmRun {
             arm: Arm {
                 stiffness,
                 friction: 2.0 * stiffness.sqrt(),
@@ -134,7 +134,7 @@ impl Chase {
                 stop,
             },
             start: [from, 0.0],
-            frames,
+            bases,
             frame_s,
         }
     }
@@ -145,7 +145,7 @@ impl Chase {
     pub fn follow(&self, step: Step, count: u32, mut keep: impl FnMut(State)) {
         let h = self.frame_s / f64::from(count);
         let mut y = self.start;
-        for line in &self.frames {
+        for line in &self.bases {
             for i in 0..count {
                 y = step(&self.arm, line, h * f64::from(i), y, h);
                 if y[0] >= self.arm.stop {
@@ -158,14 +158,14 @@ impl Chase {
 
     /// States at the ends of all frames.
     pub fn states(&self, step: Step, count: u32) -> Vec<State> {
-        let mut states = Vec::with_capacity(self.frames.len());
+        let mut states = Vec::with_capacity(self.bases.len());
         self.follow(step, count, |y| states.push(y));
         states
     }
 }
 
 /// State `h` seconds after `t`.
-pub type Step = fn(&Arm, &Line, f64, State, f64) -> State;
+pub type Step = fn(&Arm, &TargetLine, f64, State, f64) -> State;
 
 /// An integration method of the study.
 #[derive(Debug, serde::Serialize)]
@@ -198,15 +198,15 @@ pub const METHODS: &[Method] = rows! { Method { name, summary, order, step }
             let middle = arm.stage(line.at(t + h / 2.0), y, h / 2.0);
             each([0, 1], |i| 2.0 * middle[i] - y[i])
         };
-    "exact-linear", "the closed form for a target on a straight line between frames", 1, chased;
+    "exact-linear", "the closed form for a target on a straight line between frames", 1, exact_linear;
 };
 
-fn rk4(arm: &Arm, line: &Line, t: f64, y: State, h: f64) -> State {
+fn rk4(arm: &Arm, line: &TargetLine, t: f64, y: State, h: f64) -> State {
     arm.rk4(|t| line.at(t), t, y, h)
 }
 
 /// RK4 behind `sin t` itself instead of the lines between frame ends.
-pub fn rk4_of_sine(arm: &Arm, line: &Line, t: f64, y: State, h: f64) -> State {
+pub fn rk4_of_sine(arm: &Arm, line: &TargetLine, t: f64, y: State, h: f64) -> State {
     arm.rk4(|t| libm::sin(line.start + t), t, y, h)
 }
 
@@ -254,8 +254,8 @@ impl Arm {
             let change = [dx + g * dv, dv];
             y = along(y, 1.0, change);
             let size = |y: State| y[0].abs().max(y[1].abs());
-            let goes_on = size(change) > NEGLIGIBLE * (1.0 + size(y));
-            if self.stiffening == 0.0 || !goes_on {
+            let continues = size(change) > NEGLIGIBLE * (1.0 + size(y));
+            if self.stiffening == 0.0 || !continues {
                 break;
             }
         }
@@ -265,7 +265,7 @@ impl Arm {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm_study::{ArmPoint, Setting};
+    use super::super::arm_study::{ArmPoint, ArmSetting};
     use super::*;
     use crate::arithmetic::Expansion;
 
@@ -297,31 +297,31 @@ mod tests {
         for zeta in near.chain([0.1, 0.5, 2.0, 5.0]) {
             for (k, t) in [(1.0, 0.01), (1e2, 1.0 / 60.0), (1e4, 0.05), (1e6, 0.008)] {
                 let state = [1.0, -3.0];
-                let (found, wanted) = (released(k, zeta, state, t), by_series(k, zeta, state, t));
+                let (found, wanted) = (decayed(k, zeta, state, t), by_series(k, zeta, state, t));
                 let off = (found[0] - wanted[0]).abs();
                 let off = off.max((found[1] - wanted[1]).abs() / k.sqrt());
                 assert!(off < 2e-15, "{k} {zeta} {t}: {off:e}");
             }
         }
         // exp times cosh would be zero times infinity here.
-        assert!(released(1e6, 2.0, [1.0, -3.0], 20.0)[0].abs() < 1e-300);
+        assert!(decayed(1e6, 2.0, [1.0, -3.0], 20.0)[0].abs() < 1e-300);
     }
 
     /// States of a linear arm behind `sin t` itself at the ends of all frames.
     ///
     /// The arm oscillates as `a sin t + b cos t`, and its deviation at the start decays.
-    fn linear_way(chase: &Chase) -> Vec<State> {
-        let k = chase.arm.stiffness;
+    fn linear_way(run: &ArmRun) -> Vec<State> {
+        let k = run.arm.stiffness;
         let share = k / ((k + 1.0) * (k + 1.0));
         let (a, b) = (share * (k - 1.0), -2.0 * share * k.sqrt());
-        let rest = [chase.start[0] - b, chase.start[1] - a];
-        let at = |line: &Line| {
-            let t = line.start + chase.frame_s;
+        let rest = [run.start[0] - b, run.start[1] - a];
+        let at = |line: &TargetLine| {
+            let t = line.start + run.frame_s;
             let (sin, cos) = (libm::sin(t), libm::cos(t));
-            let [x, v] = released(k, 1.0, rest, t);
+            let [x, v] = decayed(k, 1.0, rest, t);
             [a * sin + b * cos + x, a * cos - b * sin + v]
         };
-        chase.frames.iter().map(at).collect()
+        run.bases.iter().map(at).collect()
     }
 
     #[test]
@@ -350,8 +350,8 @@ mod tests {
             ),
         ];
         for (stiffness, t, wanted) in wanted {
-            let chase = Chase::new(ArmKind::Linear, stiffness, 64.0, t);
-            let way = linear_way(&chase);
+            let run = ArmRun::new(ArmKind::Linear, stiffness, 64.0, t);
+            let way = linear_way(&run);
             let last = way.last().expect("a frame");
             for (found, wanted) in last.iter().zip(wanted) {
                 assert!((found - wanted).abs() < 2e-15, "{stiffness} {t}: {found}");
@@ -362,15 +362,15 @@ mod tests {
     #[test]
     fn the_reference_is_the_closed_form_where_there_is_one() {
         for stiffness in [1e2, 1e4, 1e6] {
-            let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
+            let run = ArmRun::new(ArmKind::Linear, stiffness, 30.0, 1.0);
             let omega = stiffness.sqrt();
             let count = (omega / 30.0 / 1e-3).ceil() as u32;
-            let closed = linear_way(&chase);
-            for (a, b) in chase.states(rk4_of_sine, count).iter().zip(&closed) {
+            let closed = linear_way(&run);
+            for (a, b) in run.states(rk4_of_sine, count).iter().zip(&closed) {
                 assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
             }
-            let lines = chase.states(chased, 1);
-            for (a, b) in chase.states(rk4, count).iter().zip(&lines) {
+            let lines = run.states(exact_linear, 1);
+            for (a, b) in run.states(rk4, count).iter().zip(&lines) {
                 assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
             }
         }
@@ -379,19 +379,19 @@ mod tests {
     /// Time of sin t = 0.6 on the way down: until then the arm is pushed into its stop.
     #[test]
     fn the_stop_is_met_and_left() {
-        let chase = Chase::new(ArmKind::Collision, 1e2, 60.0, 3.0);
+        let run = ArmRun::new(ArmKind::Collision, 1e2, 60.0, 3.0);
         let left = std::f64::consts::PI - 0.6f64.asin();
-        let states = chase.states(rk4, 500);
+        let states = run.states(rk4, 500);
         let at_stop = |i: &usize| states[*i] == [0.6, 0.0];
         let first = (0..states.len()).find(at_stop).expect("it is met");
         let last = (0..states.len()).rfind(at_stop).expect("it is met");
         assert!((first..=last).all(|i| at_stop(&i)) && first < 60);
-        let end = |i: usize| chase.frames[i].start + chase.frame_s;
+        let end = |i: usize| run.bases[i].start + run.frame_s;
         assert!(end(last) <= left + 1e-9 && end(last + 1) > left - 1e-9);
     }
 
     fn points(arm: ArmKind, stiffness: f64, seconds: f64) -> Vec<ArmPoint> {
-        Setting { arm, stiffness }.errors(seconds)
+        ArmSetting { arm, stiffness }.errors(seconds)
     }
 
     /// Position error of a method with a number of steps per frame.
@@ -404,10 +404,10 @@ mod tests {
     ///
     /// From 1 to 2, to 4 and to 16 steps per frame; methods receive the target as such lines.
     fn orders(kind: ArmKind, seconds: f64, method: &Method) -> [f64; 3] {
-        let chase = Chase::new(kind, 1e2, 60.0, seconds);
-        let way = chase.states(rk4, 200);
+        let run = ArmRun::new(kind, 1e2, 60.0, seconds);
+        let way = run.states(rk4, 200);
         let error = |count| {
-            let states = chase.states(method.step, count).into_iter();
+            let states = run.states(method.step, count).into_iter();
             let apart = states.zip(&way).map(|(a, b)| (a[0] - b[0]).abs());
             apart.fold(0.0, f64::max)
         };

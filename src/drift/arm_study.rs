@@ -6,10 +6,10 @@ use std::hint::black_box;
 
 use serde::Serialize;
 
-use super::arm::{Arm, ArmKind, Chase, Line, METHODS, Method, rk4_of_sine};
+use super::arm::{Arm, ArmKind, ArmRun, METHODS, Method, TargetLine, rk4_of_sine};
+use super::bases::task;
 use super::exact::larger;
-use super::frames::task;
-use super::rated::{Recommendation, recommended};
+use super::recommendation::{Recommendation, recommended};
 use crate::measure::{OverProcesses, TimedTask};
 use crate::statistics::{Estimate, flat};
 
@@ -26,7 +26,7 @@ pub const SECONDS: f64 = 10.0;
 pub const ARM_TOLERANCE: f64 = 1e-3;
 
 /// A method that is stable up to this `omega h` counts as always stable.
-const ALWAYS: f64 = 1e4;
+const STABLE_OMEGA_H: f64 = 1e4;
 
 /// Slack of the stability conditions, for rounding.
 const SLACK: f64 = 1e-12;
@@ -42,7 +42,7 @@ fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
         stiffening: 0.0,
         stop: f64::INFINITY,
     };
-    let column = |start| (method.step)(&arm, &Line::default(), 0.0, start, h);
+    let column = |start| (method.step)(&arm, &TargetLine::default(), 0.0, start, h);
     let [[a, c], [b, d]] = [[1.0, 0.0], [0.0, 1.0]].map(column);
     let (trace, determinant) = (a + d, a * d - b * c);
     trace.abs() <= 1.0 + determinant + SLACK && determinant <= 1.0 + SLACK
@@ -50,9 +50,9 @@ fn is_stable(method: &Method, zeta: f64, h: f64) -> bool {
 
 /// Smallest unstable `omega h` of a method, by bisection.
 ///
-/// `None` if it is stable up to [`ALWAYS`].
+/// `None` if it is stable up to [`STABLE_OMEGA_H`].
 fn limit(method: &Method, zeta: f64) -> Option<f64> {
-    let (mut good, mut bad) = (1e-3, ALWAYS);
+    let (mut good, mut bad) = (1e-3, STABLE_OMEGA_H);
     if is_stable(method, zeta, bad) {
         return None;
     }
@@ -85,7 +85,7 @@ pub fn stability() -> impl Iterator<Item = Stability> {
 
 /// A critically damped arm.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Setting {
+pub struct ArmSetting {
     /// Kind of arm.
     pub arm: ArmKind,
     /// k in 1/s^2.
@@ -97,7 +97,7 @@ pub struct Setting {
 pub struct ArmPoint {
     /// Arm.
     #[serde(flatten)]
-    pub setting: Setting,
+    pub setting: ArmSetting,
     /// Name of the method.
     pub method: &'static str,
     /// Number of equal steps per frame.
@@ -114,20 +114,20 @@ pub struct ArmPoint {
 pub struct ArmChoice {
     /// Arm.
     #[serde(flatten)]
-    pub setting: Setting,
+    pub setting: ArmSetting,
     /// Method, with the number of steps and the reason.
     #[serde(flatten)]
     pub choice: Recommendation,
 }
 
 /// Every arm with every stiffness.
-pub fn settings() -> impl Iterator<Item = Setting> {
-    let of = |arm| STIFFNESSES.map(|stiffness| Setting { arm, stiffness });
+pub fn settings() -> impl Iterator<Item = ArmSetting> {
+    let of = |arm| STIFFNESSES.map(|stiffness| ArmSetting { arm, stiffness });
     ArmKind::ALL.into_iter().flat_map(of)
 }
 
 /// Every method with every number of steps per frame.
-fn efforts() -> impl Iterator<Item = (&'static Method, u32)> {
+fn variants() -> impl Iterator<Item = (&'static Method, u32)> {
     let methods = METHODS.iter();
     methods.flat_map(|method| SUBSTEPS.map(|n| (method, n)))
 }
@@ -136,38 +136,38 @@ fn efforts() -> impl Iterator<Item = (&'static Method, u32)> {
 const REFERENCE_STEP: f64 = 1e-3;
 
 /// Error that counts as divergence, in units of the arm's own motion.
-const BLOWN_UP: f64 = 1e3;
+const DIVERGED: f64 = 1e3;
 
-impl Setting {
-    fn chase(self, seconds: f64) -> Chase {
-        Chase::new(self.arm, self.stiffness, RATE_HZ, seconds)
+impl ArmSetting {
+    fn run(self, seconds: f64) -> ArmRun {
+        ArmRun::new(self.arm, self.stiffness, RATE_HZ, seconds)
     }
 
     /// Errors of all methods and numbers of steps on this arm.
     pub fn errors(self, seconds: f64) -> Vec<ArmPoint> {
-        let chase = self.chase(seconds);
+        let run = self.run(seconds);
         let omega_h = self.stiffness.sqrt() / RATE_HZ;
-        let truth = chase.states(rk4_of_sine, (omega_h / REFERENCE_STEP).ceil() as u32);
+        let truth = run.states(rk4_of_sine, (omega_h / REFERENCE_STEP).ceil() as u32);
         let point = |(method, substeps): (&'static Method, u32)| {
-            let states = chase.states(method.step, substeps).into_iter();
+            let states = run.states(method.step, substeps).into_iter();
             let apart = states.zip(&truth).map(|(a, b)| (a[0] - b[0]).abs());
             let worst = apart.fold(0.0, larger);
             ArmPoint {
                 setting: self,
                 method: method.name,
                 substeps,
-                position_error: if worst < BLOWN_UP { worst } else { f64::NAN },
+                position_error: if worst < DIVERGED { worst } else { f64::NAN },
                 us_per_second: None,
             }
         };
-        efforts().map(point).collect()
+        variants().map(point).collect()
     }
 
     /// Tasks of all points: the first second, while the arm settles.
     pub fn tasks(self) -> impl Iterator<Item = TimedTask<'static>> {
-        efforts().map(move |(method, substeps)| {
-            let chase = self.chase(1.0);
-            task(move || black_box(&chase).follow(method.step, substeps, |y| _ = black_box(y)))
+        variants().map(move |(method, substeps)| {
+            let run = self.run(1.0);
+            task(move || black_box(&run).follow(method.step, substeps, |y| _ = black_box(y)))
         })
     }
 }

@@ -53,7 +53,7 @@ impl Matrix {
     }
 
     /// Counter-clockwise rotation by exact degrees about the axis 0, 1 or 2.
-    pub fn about(axis: usize, degrees: &Expansion) -> Self {
+    pub fn rotation(axis: usize, degrees: &Expansion) -> Self {
         let (sin, cos) = sin_cos_degrees(degrees);
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut turn = Matrix::from(DMat3::IDENTITY);
@@ -64,7 +64,7 @@ impl Matrix {
     }
 
     /// The matrix minus the identity, rounded.
-    fn beyond_identity(&self) -> DMat3 {
+    fn minus_identity(&self) -> DMat3 {
         let one = Matrix::from(DMat3::IDENTITY);
         let entry = |i: usize, j: usize| (&self.0[j][i] - &one.0[j][i]).estimate();
         DMat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| entry(i, j))))
@@ -82,7 +82,7 @@ pub fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
-fn largest(matrix: &DMat3) -> f64 {
+fn largest_entry(matrix: &DMat3) -> f64 {
     let sizes = matrix.to_cols_array().map(f64::abs);
     sizes.into_iter().fold(0.0, larger)
 }
@@ -95,9 +95,9 @@ const MOST_STEPS: u32 = 60;
 /// Largest entry of `X^T X - I`, which is zero for a rotation, and the angle in radians.
 pub fn errors(axes: DMat3, exact: &Matrix) -> [f64; 2] {
     let axes = Matrix::from(axes);
-    let gram = axes.transposed_times(&axes).beyond_identity();
-    let off = exact.transposed_times(&axes).beyond_identity();
-    [largest(&gram), angle(off)]
+    let gram = axes.transposed_times(&axes).minus_identity();
+    let off = exact.transposed_times(&axes).minus_identity();
+    [largest_entry(&gram), angle(off)]
 }
 
 /// Angle of the rotation nearest to I + E, its polar factor; NaN without one.
@@ -112,7 +112,7 @@ fn angle(mut off: DMat3) -> f64 {
     off = off * scale + DMat3::IDENTITY * (scale - 1.0);
     for _ in 0..MOST_STEPS {
         let gram = off + off.transpose() + off.transpose() * off;
-        if largest(&gram) < 1e-14 {
+        if largest_entry(&gram) < 1e-14 {
             // trace = 1 + 2 cos; the antisymmetric part is sin times the axis. Together they give
             // every angle to full precision.
             let apart = off - off.transpose();
@@ -140,8 +140,8 @@ mod tests {
 
     fn step() -> Matrix {
         let [yaw, pitch, roll] = [0.7, 0.3, 0.1].map(degrees);
-        let turned = Matrix::about(1, &yaw).times(&Matrix::about(0, &pitch));
-        turned.times(&Matrix::about(2, &roll))
+        let rotated = Matrix::rotation(1, &yaw).times(&Matrix::rotation(0, &pitch));
+        rotated.times(&Matrix::rotation(2, &roll))
     }
 
     #[test]
@@ -241,9 +241,9 @@ mod tests {
     fn ten_million_steps_are_good_to_forty_digits() {
         // Rotations about one axis have a closed form, and a power is a product of powers: 10^7 =
         // 3^14 + 5217031.
-        let about = Matrix::about(2, &degrees(0.7)).power(10_000_000);
-        let closed = Matrix::about(2, &Expansion::product(0.7, 1e7));
-        assert!(apart(&about, &closed) < 1e-45);
+        let rotated = Matrix::rotation(2, &degrees(0.7)).power(10_000_000);
+        let closed = Matrix::rotation(2, &Expansion::product(0.7, 1e7));
+        assert!(apart(&rotated, &closed) < 1e-45);
         let mut cubed = step();
         for _ in 0..14 {
             cubed = cubed.times(&cubed).times(&cubed);
@@ -279,7 +279,7 @@ mod tests {
         let stretched = DMat3::from_diagonal(DVec3::new(1.2, 1.0, 0.9));
         for degree in [1e-15, 1e-9, 0.3, 90.0, 179.999_999, 180.0] {
             for axes in [DMat3::IDENTITY, stretched] {
-                let [_, found] = errors(axes, &Matrix::about(1, &degrees(degree)));
+                let [_, found] = errors(axes, &Matrix::rotation(1, &degrees(degree)));
                 let found = found.to_degrees();
                 assert!((found / degree - 1.0).abs() < 1e-9, "{degree}: {found}");
             }

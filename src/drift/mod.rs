@@ -4,24 +4,24 @@
 
 mod arm;
 mod arm_study;
+mod bases;
 mod exact;
-mod frames;
-mod rated;
+mod recommendation;
 mod rotation;
 
 use serde::Serialize;
 
 pub use arm::ArmKind;
 pub use arm_study::{ARM_TOLERANCE, ArmChoice, ArmPoint, RATE_HZ, SECONDS, Stability};
-pub use frames::STEADY;
-pub use rated::Recommendation;
+pub use bases::STEADY;
+pub use recommendation::Recommendation;
 
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
 use crate::spec::{SpecError, parse_number, values};
 use crate::statistics::{Estimate, flat};
+use bases::{QUERIES, QUERY_STEPS, task_of};
 use exact::larger;
-use frames::{QUERIES, QUERY_STEPS, walking};
-use rated::recommended;
+use recommendation::recommended;
 use rotation::{METHODS, Method, Period};
 
 /// Most steps: beyond, an f32 frame overflows and a run takes hours.
@@ -110,9 +110,9 @@ pub fn prepare(steps: u64) -> DriftReport {
 
 /// All timed tasks: bases, then arms.
 fn tasks() -> Vec<TimedTask<'static>> {
-    let frames = METHODS.iter().map(|method| walking(method.walk));
-    let arms = arm_study::settings().flat_map(arm_study::Setting::tasks);
-    frames.chain(arms).collect()
+    let bases = METHODS.iter().map(|method| task_of(method.walk));
+    let arms = arm_study::settings().flat_map(arm_study::ArmSetting::tasks);
+    bases.chain(arms).collect()
 }
 
 /// Plans the timed pass, the same in every process.
@@ -155,5 +155,5 @@ pub fn walk(name: &str, steps: u64) -> (Option<f64>, Ask<'static>) {
     let method = METHODS.iter().find(|method| method.name == name);
     let method = method.expect("a name of the table");
     let error = Rotation::of(method, &Period::new(steps)).error();
-    ((!error.is_nan()).then_some(error), walking(method.walk).ask)
+    ((!error.is_nan()).then_some(error), task_of(method.walk).ask)
 }

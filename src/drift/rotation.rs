@@ -7,18 +7,18 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::exact::{Matrix, errors, larger};
-use super::frames::{
-    CORRECT_EVERY, GRAM_SCHMIDT, LECTURE, NONE, POLAR, STEADY, Walk, double, quaternion, radians,
-    single, toolkit,
+use super::bases::{
+    BasisWalk, CORRECT_EVERY, GRAM_SCHMIDT, LECTURE_PI_RATIO, NONE, POLAR, STEADY, double,
+    quaternion, radians, single, toolkit,
 };
+use super::exact::{Matrix, errors, larger};
 use crate::arithmetic::Expansion;
 
 /// Yaw, pitch and roll by `times` times [`STEADY`], to more than 40 digits.
-fn turned(times: u64) -> Matrix {
-    let about = |axis, degrees| Matrix::about(axis, &Expansion::product(degrees, times as f64));
-    let turned = about(1, STEADY[0]).times(&about(0, STEADY[1]));
-    turned.times(&about(2, STEADY[2]))
+fn rotated(times: u64) -> Matrix {
+    let about = |axis, degrees| Matrix::rotation(axis, &Expansion::product(degrees, times as f64));
+    let rotated = about(1, STEADY[0]).times(&about(0, STEADY[1]));
+    rotated.times(&about(2, STEADY[2]))
 }
 
 /// A method that keeps a camera basis.
@@ -36,24 +36,24 @@ pub struct Method {
     pub sums_angles: bool,
     /// Axes u, v, n after each of some numbers of steps.
     #[serde(skip)]
-    pub walk: Walk,
+    pub walk: BasisWalk,
 }
 
 pub const METHODS: &[Method] = rows! { Method { name, summary, sums_angles, walk }
-    "f32", "f32 axes, turned and never corrected", false, single::frame::<NONE>;
-    "f32-gram-schmidt", "f32 axes, Gram-Schmidt after each step", false, single::frame::<GRAM_SCHMIDT>;
+    "f32", "f32 axes, turned and never corrected", false, single::basis::<NONE>;
+    "f32-gram-schmidt", "f32 axes, Gram-Schmidt after each step", false, single::basis::<GRAM_SCHMIDT>;
     "f32-polar-100", "f32 axes, a Newton step to the polar factor after 100 rotations",
-        false, single::frame::<POLAR>;
+        false, single::basis::<POLAR>;
     "f32-quaternion", "f32 quaternion, normalised after each step", false, quaternion;
     "f32-radians", "f32 angles summed in radians, axes recomputed by sine and cosine",
         true, radians;
-    "f64", "f64 axes, turned and never corrected", false, double::frame::<NONE>;
-    "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step", false, double::frame::<GRAM_SCHMIDT>;
+    "f64", "f64 axes, turned and never corrected", false, double::basis::<NONE>;
+    "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step", false, double::basis::<GRAM_SCHMIDT>;
     "f64-polar-100",
         "f64 axes, a Newton step to the polar factor after 100 rotations: this toolkit's camera",
-        false, |looks| toolkit(looks, 1.0);
+        false, |samples| toolkit(samples, 1.0);
     "f64-lecture", "this toolkit's camera with the lecture's 3.142/180 for pi/180",
-        false, |looks| toolkit(looks, LECTURE);
+        false, |samples| toolkit(samples, LECTURE_PI_RATIO);
 };
 
 /// Steps over which errors are maximized: one period between two corrections.
@@ -72,14 +72,14 @@ pub struct Period {
 impl Period {
     pub fn new(last: u64) -> Period {
         let steps = last.saturating_sub(PERIOD - 1).max(1)..=last;
-        let (step, mut turns) = (turned(1), turned(1).power(steps.start() - 1));
+        let (step, mut turns) = (rotated(1), rotated(1).power(steps.start() - 1));
         let turn = |_| {
             turns = turns.times(&step);
             turns.clone()
         };
         let turns = steps.clone().map(turn).collect();
         Period {
-            exact: [turns, steps.clone().map(turned).collect()],
+            exact: [turns, steps.clone().map(rotated).collect()],
             steps,
         }
     }

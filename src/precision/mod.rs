@@ -3,12 +3,12 @@
 //! Contains the points of that diagram (the errors of each, and its time on each structure) and the
 //! sweeps; the truth comes from the oracle, the clock from `measure`.
 
-mod judged;
+mod culling_result;
 mod point;
 mod points;
 mod sweeps;
 
-pub use judged::Names;
+pub use culling_result::Names;
 pub use point::Point;
 pub use points::{Precision, prepare, time};
 pub use sweeps::{SWEEPS, Sweep, SweepRow, sweep};

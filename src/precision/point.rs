@@ -6,7 +6,7 @@ use std::ops::Add;
 
 use serde::Serialize;
 
-use super::judged::{Judged, Names, counts_or_null};
+use super::culling_result::{CullingResult, Names, counts_or_null};
 use crate::measure::{OverProcesses, Status, Verdict};
 use crate::statistics::{ALPHA, Estimate, dominance, flat, rate_of, shows_less};
 use crate::verify::ErrorCount;
@@ -79,14 +79,14 @@ pub struct Point {
     dimensions: Vec<Dimension>,
     /// Index among the points before sorting, if it has a time.
     #[serde(skip)]
-    way: Option<usize>,
+    task: Option<usize>,
 }
 
 impl Point {
     /// Point for a structure with a culling's errors, without a time.
-    pub(super) fn of(judged: &Judged, structure: &str, memory_bytes_per_item: f64) -> Point {
-        let (errors, depths) = (&judged.errors[..], &judged.worst_miss_px);
-        let is_judged = judged.refused.is_none();
+    pub(super) fn of(result: &CullingResult, structure: &str, memory_bytes_per_item: f64) -> Point {
+        let (errors, depths) = (&result.errors[..], &result.worst_miss_px);
+        let is_made = result.refused.is_none();
         let counts: ErrorCount = errors.iter().copied().sum();
         let missed = rate_of(errors, |e| [e.false_negatives, e.visible]);
         let of = |count: fn(&ErrorCount) -> u64| {
@@ -101,18 +101,18 @@ impl Point {
         ];
         Point {
             structure: structure.to_owned(),
-            names: Names::of(&judged.culling),
+            names: Names::of(&result.culling),
             excess: rate_of(errors, |e| [e.false_positives, e.visible]),
             false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
-            counts: is_judged.then_some(counts),
+            counts: is_made.then_some(counts),
             worst_miss_px: depths.iter().copied().reduce(f64::max),
             memory_bytes_per_item,
-            status: match is_judged {
+            status: match is_made {
                 false => Status::Refused,
                 true if counts.false_negatives > 0 => Status::Unsafe,
                 true => Status::Ok,
             },
-            reason: judged.refused.clone(),
+            reason: result.refused.clone(),
             dimensions,
             ..Point::default()
         }
@@ -127,10 +127,10 @@ impl Point {
     }
 
     /// Stores the time of a task, or the reason why it has none.
-    pub(super) fn time(&mut self, times: &OverProcesses<(usize, bool)>, way: usize, items: usize) {
-        self.accepts(times.failure((way, false)));
-        self.time = times.ns((way, false));
-        self.way = self.time.map(|_| way);
+    pub(super) fn time(&mut self, times: &OverProcesses<(usize, bool)>, task: usize, items: usize) {
+        self.accepts(times.failure((task, false)));
+        self.time = times.ns((task, false));
+        self.task = self.time.map(|_| task);
         self.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
     }
 
@@ -160,7 +160,7 @@ pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usiz
             (Some(a), Some(b)) if a.by_camera.is_empty() && b.by_camera.is_empty() => true,
             (Some(a), Some(b)) => shows_less(&a.by_camera, &b.by_camera, ALPHA),
             _ => {
-                let both = a.way.zip(b.way);
+                let both = a.task.zip(b.task);
                 both.is_some_and(|(a, b)| is_faster(a, b))
             }
         }
@@ -193,7 +193,7 @@ mod tests {
             structure: "linear".to_owned(),
             time: ns.map(Estimate::exact),
             dimensions,
-            way: ns.map(|ns| ns as usize),
+            task: ns.map(|ns| ns as usize),
             ..Point::default()
         }
     }

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use super::judged::Judged;
+use super::culling_result::CullingResult;
 use super::point::{Point, sort_and_mark};
 use super::sweeps::SweepRow;
 use crate::camera::{Camera, PLANE_METHODS, PlaneOptions};
@@ -56,7 +56,7 @@ pub struct Precision {
 pub type PointPlan = StudyPlan<(usize, bool)>;
 
 /// All points, checked and evaluated, but not timed.
-pub struct Prepared {
+pub struct UntimedDiagram {
     /// Tasks for the other processes.
     pub plan: PointPlan,
     precision: Precision,
@@ -110,8 +110,8 @@ impl<'a> Indexes<'a> {
 }
 
 /// Input of all points, the same in every process.
-struct Built<'a> {
-    judged: Vec<Judged>,
+struct Inputs<'a> {
+    results: Vec<CullingResult>,
     structures: Vec<Indexes<'a>>,
     /// Structures that refuse the items and are left out.
     refused: Vec<&'a str>,
@@ -119,19 +119,19 @@ struct Built<'a> {
 
 /// A structure with a culling.
 #[derive(Clone, Copy)]
-struct Way<'b> {
+struct Subject<'b> {
     indexes: &'b Indexes<'b>,
-    judged: &'b Judged,
+    result: &'b CullingResult,
 }
 
-impl<'a> Built<'a> {
+impl<'a> Inputs<'a> {
     fn new(
         setting: &'a Setting,
         cameras: &[Camera],
         truths: &[Truth],
-    ) -> Result<Built<'a>, BuildError> {
+    ) -> Result<Inputs<'a>, BuildError> {
         let (scene, structures) = (&setting.scene, &setting.structures);
-        let judge = |culling| Judged::new(scene, cameras, truths, culling);
+        let evaluate = |culling| CullingResult::new(scene, cameras, truths, culling);
         let (mut built, mut refused) = (Vec::new(), Vec::new());
         for spec in structures {
             match Indexes::new(spec, scene) {
@@ -143,36 +143,36 @@ impl<'a> Built<'a> {
                 indexes => built.push(indexes?),
             }
         }
-        Ok(Built {
-            judged: cullings().into_iter().map(judge).collect(),
+        Ok(Inputs {
+            results: cullings().into_iter().map(evaluate).collect(),
             structures: built,
             refused,
         })
     }
 
     /// Every structure with every culling.
-    fn ways(&self) -> Vec<Way<'_>> {
-        let ways = self.structures.iter().flat_map(|indexes| {
-            let judged = self.judged.iter();
-            judged.map(move |judged| Way { indexes, judged })
+    fn subjects(&self) -> Vec<Subject<'_>> {
+        let subjects = self.structures.iter().flat_map(|indexes| {
+            let results = self.results.iter();
+            results.map(move |result| Subject { indexes, result })
         });
-        ways.collect()
+        subjects.collect()
     }
 }
 
-impl Way<'_> {
+impl Subject<'_> {
     /// Appends the answer to the query of a camera.
     fn answer(self, camera: usize, out: &mut Vec<ItemId>) {
-        let index = self.indexes.of(self.judged.culling.test);
-        index.query(self.judged.views[camera].as_any(), out);
+        let index = self.indexes.of(self.result.culling.test);
+        index.query(self.result.views[camera].as_any(), out);
     }
 
     /// Compares the answers with those of the linear scan.
     fn check(self, items: usize) -> Result<(), Verdict> {
         let mut trial = Trial::new(items);
-        for (n, answer) in self.judged.answers.iter().enumerate() {
-            trial.expect(answer.iter().copied());
-            if let Err(fault) = trial.ask(|out| self.answer(n, out)) {
+        for (n, answer) in self.result.answers.iter().enumerate() {
+            trial.set_expected(answer.iter().copied());
+            if let Err(fault) = trial.run(|out| self.answer(n, out)) {
                 let place = "not the scan of its own planes: ";
                 let mut verdict = Verdict::of(&fault, place, |_| None);
                 if verdict.status == Status::Unsafe {
@@ -189,39 +189,39 @@ impl Way<'_> {
 
 /// Checks and evaluates all points, and plans their timing.
 ///
-/// [`time`] and [`Prepared::conclude`] follow. Every answer is compared with the linear scan before
+/// [`time`] and [`UntimedDiagram::conclude`] follow. Every answer is compared with the linear scan before
 /// it is timed, and the scan with the exact truth: O(cameras * items) verdicts of some 50 ns and as
 /// many plain tests for each culling. At most `most` cameras of the path are used, evenly spread.
 ///
 /// # Errors
 /// A structure that refuses the scene.
-pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
+pub fn prepare(setting: &Setting, most: usize) -> Result<UntimedDiagram, BuildError> {
     let Setting { scene, path, .. } = setting;
     let items = scene.items.len();
     let cameras = path.clone().at_most(most.max(1)).cameras;
     // A frame always makes a pose.
     let truths = cameras.iter().filter_map(|c| Truth::of_scene(c, scene));
     let truths: Vec<Truth> = truths.collect();
-    let built = Built::new(setting, &cameras, &truths)?;
+    let inputs = Inputs::new(setting, &cameras, &truths)?;
     let cameras = cameras.len();
     let (mut points, mut tasks, mut twin) = (Vec::new(), Vec::new(), None);
-    for (index, way) in built.ways().into_iter().enumerate() {
-        let Way { indexes, judged } = way;
-        let memory = indexes.of(judged.culling.test).memory().total() as f64 / items as f64;
-        let mut point = Point::of(judged, indexes.structure, memory);
-        let is_made = judged.refused.is_none();
-        let is_sound = is_made && point.accepts(way.check(items).err().as_ref());
+    for (index, subject) in inputs.subjects().into_iter().enumerate() {
+        let Subject { indexes, result } = subject;
+        let memory = indexes.of(result.culling.test).memory().total() as f64 / items as f64;
+        let mut point = Point::of(result, indexes.structure, memory);
+        let is_made = result.refused.is_none();
+        let is_sound = is_made && point.accepts(subject.check(items).err().as_ref());
         points.push(point);
         if !is_sound {
             continue;
         }
         let task = |is_twin| {
-            let expected = judged.answers.iter().map(|ids| ids.len() as u64).collect();
-            let ask = move |n: usize, out: &mut Vec<ItemId>| way.answer(n, out);
+            let expected = result.answers.iter().map(|ids| ids.len() as u64).collect();
+            let ask = move |n: usize, out: &mut Vec<ItemId>| subject.answer(n, out);
             ((index, is_twin), TimedTask::new(expected, ask))
         };
         tasks.push(task(false));
-        if judged.culling == Culling::default() {
+        if result.culling == Culling::default() {
             twin.get_or_insert_with(|| task(true));
         }
     }
@@ -229,8 +229,8 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
     let plan = StudyPlan::new(tasks, cameras, &setting.protocol);
     let mut warnings = crate::path::warnings(scene, &path.name, &path.cameras);
     let left_out = |name| format!("left out: {name} refuses these items");
-    warnings.extend(built.refused.iter().map(left_out));
-    Ok(Prepared {
+    warnings.extend(inputs.refused.iter().map(left_out));
+    Ok(UntimedDiagram {
         precision: Precision {
             scene: scene.name.clone(),
             path: path.name.clone(),
@@ -255,23 +255,23 @@ pub fn prepare(setting: &Setting, most: usize) -> Result<Prepared, BuildError> {
 /// If the scene is not the one that was planned for.
 pub fn time(setting: &Setting, most: usize, plan: &PointPlan) -> Result<ProcessTimes, BuildError> {
     let cameras = setting.path.clone().at_most(most.max(1)).cameras;
-    let built = Built::new(setting, &cameras, &[])?;
-    let ways = built.ways();
-    Ok(plan.timed(&setting.protocol, |&(way, _)| {
-        let way = ways[way];
-        Box::new(move |n, out| way.answer(n, out))
+    let inputs = Inputs::new(setting, &cameras, &[])?;
+    let subjects = inputs.subjects();
+    Ok(plan.timed(&setting.protocol, |&(index, _)| {
+        let subject = subjects[index];
+        Box::new(move |n, out| subject.answer(n, out))
     }))
 }
 
-impl Prepared {
+impl UntimedDiagram {
     /// Builds the diagram from the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
         let (mut precision, times) = (self.precision, self.plan.times(processes));
         let twin = self.plan.tasks.iter().find(|(key, _)| key.1);
-        precision.twin = twin.and_then(|&((way, _), _)| times.ratio((way, true), (way, false)));
+        precision.twin = twin.and_then(|&((n, _), _)| times.ratio((n, true), (n, false)));
         let points = &mut precision.points;
-        for (way, point) in points.iter_mut().enumerate() {
-            point.time(&times, way, precision.items);
+        for (index, point) in points.iter_mut().enumerate() {
+            point.time(&times, index, precision.items);
         }
         sort_and_mark(points, &|a, b| times.is_faster((a, false), (b, false)));
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();

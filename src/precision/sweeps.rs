@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::judged::{Judged, Names, counts_or_null};
+use super::culling_result::{CullingResult, Names, counts_or_null};
 use crate::camera::{Camera, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Surroundings};
 use crate::culling::{Arithmetic, Culling, CullingTest};
 use crate::geometry::Aabb;
@@ -88,17 +88,17 @@ pub struct SweepRow {
 }
 
 impl SweepRow {
-    fn of(test: Judged, sweep: Sweep, value: f64) -> SweepRow {
+    fn of(test: CullingResult, sweep: Sweep, value: f64) -> SweepRow {
         let known = test.refused.is_none();
-        let judged = if known { &test.errors[..] } else { &[] };
-        let missed = rate_of(judged, |e| [e.false_negatives, e.visible]);
+        let result = if known { &test.errors[..] } else { &[] };
+        let missed = rate_of(result, |e| [e.false_negatives, e.visible]);
         SweepRow {
             sweep,
             value,
             names: Names::of(&test.culling),
             false_negative_ppm: missed.map(|share| share.of_share().times(1e6)),
-            excess: rate_of(judged, |e| [e.false_positives, e.visible]),
-            errors: known.then(|| judged.iter().copied().sum()),
+            excess: rate_of(result, |e| [e.false_positives, e.visible]),
+            errors: known.then(|| result.iter().copied().sum()),
             refused: test.refused,
         }
     }
@@ -152,14 +152,14 @@ fn tests_of_cameras() -> Vec<Culling> {
 }
 
 /// Cullings of a sweep, before any camera is evaluated.
-fn unjudged(sweep: Sweep) -> Vec<Judged> {
+fn without_errors(sweep: Sweep) -> Vec<CullingResult> {
     let tests = match sweep {
         Sweep::Size => tests_of_sizes(),
         _ => tests_of_cameras(),
     };
-    let tests = tests.into_iter().map(|culling| Judged {
+    let tests = tests.into_iter().map(|culling| CullingResult {
         culling,
-        ..Judged::default()
+        ..CullingResult::default()
     });
     tests.collect()
 }
@@ -168,15 +168,15 @@ fn unjudged(sweep: Sweep) -> Vec<Judged> {
 ///
 /// Each culling gets the same cameras.
 pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
-    let mut all = sweep.values().map(|value| (value, unjudged(sweep)));
+    let mut all = sweep.values().map(|value| (value, without_errors(sweep)));
     let mut rng = SeededRng::new(seed);
     match sweep {
         Sweep::Size => {
             for _ in 0..cameras {
                 let camera = random_camera(&mut rng);
                 for (size, tests) in &mut all {
-                    let cubes = strewn(&mut rng, &camera, *size);
-                    judge(&camera, &cubes, &Surroundings::default(), tests);
+                    let cubes = scattered(&mut rng, &camera, *size);
+                    evaluate(&camera, &cubes, &Surroundings::default(), tests);
                 }
             }
         }
@@ -188,7 +188,7 @@ pub fn sweep(sweep: Sweep, cameras: usize, seed: u64) -> Vec<SweepRow> {
                         continue;
                     };
                     let boxes = boxes_about(&mut rng, &camera);
-                    judge(&camera, &boxes, &Surroundings::of_boxes(&boxes), tests);
+                    evaluate(&camera, &boxes, &Surroundings::of_boxes(&boxes), tests);
                 }
             }
         }
@@ -240,7 +240,7 @@ fn boxes_about(rng: &mut SeededRng, camera: &Camera) -> Vec<Aabb> {
     (0..BOXES).map(|_| one(rng)).collect()
 }
 
-fn judge(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [Judged]) {
+fn evaluate(camera: &Camera, boxes: &[Aabb], around: &Surroundings, tests: &mut [CullingResult]) {
     let Some(truth) = Truth::of_camera(camera, DVec3::ZERO, boxes) else {
         return;
     };
@@ -301,7 +301,7 @@ fn cube_at(camera: &Camera, ratio: f64, at: DVec3) -> Aabb {
 }
 
 /// Cubes whose centres are spread evenly over the region.
-fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
+fn scattered(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     let [low, high] = region(ratio);
     let cell = (high - low) / GRID as f64;
     let cube = |i: usize| {
@@ -361,8 +361,8 @@ mod tests {
 
     /// Errors of every test of the size sweep.
     fn of_cubes(camera: &Camera, cubes: &[Aabb]) -> Vec<ErrorCount> {
-        let mut tests = unjudged(Sweep::Size);
-        judge(camera, cubes, &Surroundings::default(), &mut tests);
+        let mut tests = without_errors(Sweep::Size);
+        evaluate(camera, cubes, &Surroundings::default(), &mut tests);
         tests.iter().map(|test| test.errors[0]).collect()
     }
 
@@ -391,7 +391,7 @@ mod tests {
                 }
                 // Conversely, cubes inside are visible, and the f64 test with all planes makes no
                 // error.
-                let within = of_cubes(&camera, &strewn(&mut rng, &camera, ratio));
+                let within = of_cubes(&camera, &scattered(&mut rng, &camera, ratio));
                 let [spheres, .., exact] = &within[..] else {
                     panic!("{within:?}")
                 };

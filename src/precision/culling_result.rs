@@ -49,7 +49,7 @@ pub(super) fn counts_or_null<S: Serializer>(
 
 /// Answers of one culling to every camera, and their errors.
 #[derive(Default)]
-pub(super) struct Judged {
+pub(super) struct CullingResult {
     pub culling: Culling,
     pub views: Vec<CameraView>,
     /// Ids for each camera that has a truth.
@@ -64,32 +64,32 @@ pub(super) struct Judged {
     pub refused: Option<String>,
 }
 
-impl Judged {
+impl CullingResult {
     /// Computes the answers and compares them with the truth about each camera.
     ///
     /// Without truths only the views are made.
-    pub fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Judged {
+    pub fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Self {
         let around = scene.surroundings();
-        let mut judged = Judged {
+        let mut result = CullingResult {
             culling,
-            ..Judged::default()
+            ..CullingResult::default()
         };
         let views = cameras.iter().map(|camera| culling.view(camera, &around));
         match views.collect::<Result<_, _>>() {
-            Ok(views) => judged.views = views,
-            Err(error) => judged.refused = Some(error.to_string()),
+            Ok(views) => result.views = views,
+            Err(error) => result.refused = Some(error.to_string()),
         }
         let items = culling.test.items(&scene.items);
-        for ((camera, view), truth) in cameras.iter().zip(&judged.views).zip(truths) {
+        for ((camera, view), truth) in cameras.iter().zip(&result.views).zip(truths) {
             let view = view.as_any();
             let answer: Vec<ItemId> = scan(&items, |b| view.sees(b)).collect();
             let errors = truth.errors(&scene.items, &answer);
-            judged.errors.push(blamed(culling.test, errors));
+            result.errors.push(blamed(culling.test, errors));
             let worst = worst_miss_px(camera, scene, truth, &answer);
-            judged.worst_miss_px.extend(worst);
-            judged.answers.push(answer);
+            result.worst_miss_px.extend(worst);
+            result.answers.push(answer);
         }
-        judged
+        result
     }
 }
 
