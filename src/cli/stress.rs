@@ -17,7 +17,7 @@ use super::{Ending, interrupt, print, text};
 use crate::index::{Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::report::grouped;
-use crate::stress::extremes::{self, Extremes, Tally};
+use crate::stress::extremes::{self, Extremes, VerdictCounts};
 use crate::stress::{
     Name, ORACLE, Row, Section, Status, Vector, built_in, read_vectors_file, replay,
 };
@@ -135,7 +135,7 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
             row.kernel = Some(kernel.name());
         }
         section.name = format!("{} by {kernel}", section.name);
-        section.tally = Tally::default();
+        section.tally = VerdictCounts::default();
     }
     sections.retain(|section| !section.rows.is_empty());
     sections
@@ -152,7 +152,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         (">failed", |s| text::count(s.count(Status::Fail))),
     ];
     let width = text::width();
-    let mut told = vec![Table::with(sections, columns).fitted(width)];
+    let mut reported = vec![Table::with(sections, columns).fitted(width)];
     let rows = || sections.iter().flat_map(|section| &section.rows);
     // Equal except for structure, test and instruction set.
     let mut alike = BTreeMap::<_, Vec<String>>::new();
@@ -164,14 +164,14 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     }
     for ((id, level, expected, got), who) in alike.iter().take(MOST_SHOWN) {
         let (id, who) = (text::plain(id), text::first_of(who, 3));
-        told.push(format!("{id}, {level} level, {who}:"));
-        told.push(format!("  expected {expected}\n  got {got}"));
+        reported.push(format!("{id}, {level} level, {who}:"));
+        reported.push(format!("  expected {expected}\n  got {got}"));
     }
     if alike.len() > MOST_SHOWN {
         let more = text::counted(alike.len() - MOST_SHOWN, "further kind");
-        told.push(format!("{more}: --format json"));
+        reported.push(format!("{more}: --format json"));
     }
-    let mut tally = Tally::default();
+    let mut tally = VerdictCounts::default();
     sections.iter().for_each(|section| tally += section.tally);
     if tally.boxes > 0 {
         let line = format!(
@@ -187,10 +187,10 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
                 tally.errors.touch_dropped as usize,
                 "dropped boundary contact"
             ),
-            text::count(tally.lost_bare as usize),
+            text::count(tally.lost_without_epsilon as usize),
             text::count(tally.refused as usize),
         );
-        told.push(text::wrapped(&line, width) + "\n");
+        reported.push(text::wrapped(&line, width) + "\n");
     }
     let count = |status| text::count(rows().filter(|row| row.status == status).count());
     let [passed, refused, failed] = [Status::Pass, Status::Refused, Status::Fail].map(count);
@@ -199,6 +199,6 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         "{checks} in {seconds:.1} s: {passed} passed, {refused} refused as they must be, {failed} \
          failed{note}"
     );
-    told.push(text::wrapped(&line, width));
-    text::print(&told)
+    reported.push(text::wrapped(&line, width));
+    text::print(&reported)
 }

@@ -4,14 +4,14 @@
 //! result.
 
 pub mod extremes;
+mod level_results;
 mod replay;
-mod sheet;
 mod vectors;
 
 use serde::Serialize;
 
+pub(crate) use level_results::ORACLE;
 pub use replay::{Replay, replay};
-pub(crate) use sheet::ORACLE;
 pub use vectors::{Name, Vector, VectorBox, VectorCamera, VectorPoint, built_in, read_vectors};
 pub(crate) use vectors::{Names, read_vectors_file};
 
@@ -48,30 +48,30 @@ impl Status {
 /// Content of an answer: names of boxes, or words.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(untagged)]
-pub enum Said {
+pub enum Answer {
     /// A set of boxes.
     Names(Vec<String>),
     /// An outcome in words.
     Text(String),
 }
 
-impl Said {
-    fn of_names<'n>(names: impl IntoIterator<Item = &'n Name>) -> Said {
-        Said::Names(names.into_iter().map(|name| name.0.clone()).collect())
+impl Answer {
+    fn of_names<'n>(names: impl IntoIterator<Item = &'n Name>) -> Answer {
+        Answer::Names(names.into_iter().map(|name| name.0.clone()).collect())
     }
 }
 
-impl<T: Into<String>> From<T> for Said {
-    fn from(text: T) -> Said {
-        Said::Text(text.into())
+impl<T: Into<String>> From<T> for Answer {
+    fn from(text: T) -> Answer {
+        Answer::Text(text.into())
     }
 }
 
-impl std::fmt::Display for Said {
+impl std::fmt::Display for Answer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Said::Names(names) => write!(f, "{{{}}}", names.join(", ")),
-            Said::Text(text) => f.write_str(text),
+            Answer::Names(names) => write!(f, "{{{}}}", names.join(", ")),
+            Answer::Text(text) => f.write_str(text),
         }
     }
 }
@@ -90,9 +90,9 @@ pub struct Row {
     /// Outcome of the check.
     pub status: Status,
     /// Declared outcome.
-    pub expected: Said,
+    pub expected: Answer,
     /// Answer of the structure.
-    pub got: Said,
+    pub got: Answer,
     /// Instruction set, if it is not the chosen one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kernel: Option<&'static str>,
@@ -108,7 +108,7 @@ pub struct Section {
     /// Number of boxes in all cases.
     pub boxes: u64,
     /// Verdicts of the oracle (extremes at camera level).
-    pub tally: extremes::Tally,
+    pub tally: extremes::VerdictCounts,
     /// Checks with their outcomes.
     pub rows: Vec<Row>,
 }

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec3, Vec3};
 
-use super::sheet::{Built, ORACLE, Sheet, sees_exactly, sees_fused, slack};
-use super::{Level, Name, Names, Row, Said, Status, Vector, VectorBox, VectorCamera};
+use super::level_results::{Built, LevelResults, ORACLE, sees_exactly, sees_fused, slack};
+use super::{Answer, Level, Name, Names, Row, Status, Vector, VectorBox, VectorCamera};
 use crate::camera::{CameraError, PlaneOptions, Surroundings};
 use crate::culling::{Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::{Aabb, ConvexVolume};
@@ -42,23 +42,23 @@ impl Replay<'_> {
     pub fn vector(&self, vector: &Vector) -> Vec<Row> {
         let sound = vector.sound_boxes().map(|b| (b.id.clone(), b.bounds()));
         let (names, items): (Vec<Name>, Vec<Aabb>) = sound.unzip();
-        let places = names.iter().zip(0..).collect();
-        let sheet = |level| Sheet {
+        let indices = names.iter().zip(0..).collect();
+        let results = |level| LevelResults {
             vector,
             level,
             names: &names,
             items: &items,
-            places: &places,
+            indices: &indices,
             rows: Vec::new(),
         };
-        let (mut planes, mut camera) = (sheet(Level::Planes), sheet(Level::Camera));
-        let built = self.built(&items);
+        let (mut planes, mut camera) = (results(Level::Planes), results(Level::Camera));
+        let built = self.build_all(&items);
         let given = vector.planes();
         if let Some(given) = &given {
             let volume = ConvexVolume::from_planes(given);
-            given_planes(&mut planes, volume.map_err(|e| e.to_string()), &built);
+            check_planes(&mut planes, volume.map_err(|e| e.to_string()), &built);
         }
-        points(&mut planes, &built);
+        check_points(&mut planes, &built);
         if let Some(stated) = &vector.camera {
             self.camera(&mut camera, stated, &built);
         }
@@ -66,14 +66,14 @@ impl Replay<'_> {
             Some(_) => &mut planes,
             None => &mut camera,
         };
-        self.rejected(at_load);
-        claims(at_load);
-        planes.unknown_names();
-        camera.unknown_names();
+        self.check_rejections(at_load);
+        check_claims(at_load);
+        planes.add_unknown_names();
+        camera.add_unknown_names();
         [planes.rows, camera.rows].concat()
     }
 
-    fn built(&self, items: &[Aabb]) -> Vec<Built<'_>> {
+    fn build_all(&self, items: &[Aabb]) -> Vec<Built<'_>> {
         let build = |spec: &StructureSpec| spec.build(items);
         let specs = self.structures.iter();
         specs.map(|s| (s.label.as_str(), build(s))).collect()
@@ -83,15 +83,15 @@ impl Replay<'_> {
     ///
     /// Each rejected box is built among some sound ones, and the first non-finite one among all
     /// boxes.
-    fn rejected(&self, sheet: &mut Sheet) {
-        let vector = sheet.vector;
+    fn check_rejections(&self, results: &mut LevelResults) {
+        let vector = results.vector;
         let all: Vec<Aabb> = vector.boxes().map(VectorBox::bounds).collect();
-        let places: BTreeMap<&Name, usize> = vector.boxes().map(|b| &b.id).zip(0..).collect();
+        let indices: BTreeMap<&Name, usize> = vector.boxes().map(|b| &b.id).zip(0..).collect();
         let is_bad = |b: &Aabb| !b.is_finite();
         for name in vector.expect_rejected_at_load.iter().flatten() {
             let mut scenes = Vec::new();
-            if let Some(&index) = places.get(name) {
-                let mut scene = sheet.items[..sheet.items.len().min(BESIDE)].to_vec();
+            if let Some(&index) = indices.get(name) {
+                let mut scene = results.items[..results.items.len().min(NEIGHBOURS)].to_vec();
                 let item = index.min(scene.len());
                 scene.insert(item, all[index]);
                 scenes.push((scene, item));
@@ -100,7 +100,7 @@ impl Replay<'_> {
                 }
             }
             for spec in self.structures {
-                let build = |(scene, item): &(Vec<Aabb>, usize)| refused(spec.build(scene), *item);
+                let build = |(scene, item): &(Vec<Aabb>, usize)| refusal(spec.build(scene), *item);
                 let refusals: Result<Vec<String>, String> = scenes.iter().map(build).collect();
                 let (status, got) = match refusals.map(|texts| texts.into_iter().next()) {
                     Ok(Some(text)) => (Status::Refused, text),
@@ -108,23 +108,23 @@ impl Replay<'_> {
                     Err(text) => (Status::Fail, text),
                 };
                 let expected = format!("refused at load: {}", name.0);
-                sheet.row(Some(name), [&spec.label, "build"], status, expected, got);
+                results.add_row(Some(name), [&spec.label, "build"], status, expected, got);
             }
         }
     }
 
-    fn camera(&self, sheet: &mut Sheet, stated: &VectorCamera, boxes: &[Built]) {
-        let vector = sheet.vector;
-        let around = Surroundings::of_boxes(sheet.items);
+    fn camera(&self, results: &mut LevelResults, stated: &VectorCamera, boxes: &[Built]) {
+        let vector = results.vector;
+        let around = Surroundings::of_boxes(results.items);
         let camera = stated.camera().map_err(CullingError::from);
         let sound = camera.as_ref().ok();
         let sound = sound.filter(|_| vector.camera_error().is_none());
         let oracle = sound.and_then(|c| Oracle::of_camera(&stated.pose(), &c.lens, DVec3::ZERO));
         // The oracle decides what is visible if the file does not state it.
-        let truth = oracle.as_ref().map(|oracle| sheet.seen_by(oracle));
+        let truth = oracle.as_ref().map(|oracle| results.visible_to(oracle));
         let listed = &vector.expected_visible_camera;
         let wanted = listed.clone().or(truth).unwrap_or_default();
-        let cubes = self.built(&CullingTest::Sphere.items(sheet.items));
+        let cubes = self.build_all(&CullingTest::Sphere.items(results.items));
         for (test, name, _) in TESTS {
             let structures = match test {
                 CullingTest::Sphere => &cubes[..],
@@ -140,13 +140,13 @@ impl Replay<'_> {
                 }
                 // A camera that cannot be made sees nothing.
                 (None, Err(_)) if wanted.is_empty() && listed.is_some() => {
-                    Some(Said::of_names(&wanted))
+                    Some(Answer::of_names(&wanted))
                 }
                 _ => None,
             };
-            let (view, visible) = (view.map_err(|e| e.to_string()), Said::of_names(&wanted));
+            let (view, visible) = (view.map_err(|e| e.to_string()), Answer::of_names(&wanted));
             let subject = [name, "a camera"];
-            let Some(view) = accepted(sheet, subject, view, declared, visible, structures) else {
+            let Some(view) = accept(results, subject, view, declared, visible, structures) else {
                 continue;
             };
             let exact = oracle.as_ref().zip(sound);
@@ -166,26 +166,26 @@ impl Replay<'_> {
                 }
             };
             for (structure, built) in structures {
-                let answer = sheet.query(built, view.as_any(), |_| true);
-                sheet.compared([structure, name], &wanted, &answer, fault);
+                let answer = results.query(built, view.as_any(), |_| true);
+                results.add_comparison([structure, name], &wanted, &answer, fault);
             }
         }
         if let Some(oracle) = &oracle {
-            sheet.verdicts(oracle, listed, &vector.touch_camera);
+            results.add_oracle(oracle, listed, &vector.touch_camera);
         }
     }
 }
 
 /// Number of sound boxes around one that must be rejected.
-const BESIDE: usize = 64;
+const NEIGHBOURS: usize = 64;
 
 /// Adds rows for a file's claims about its own planes and empty boxes.
-fn claims(sheet: &mut Sheet) {
-    let vector = sheet.vector;
-    let mut row = |about: &Name, expected: Said, got: Said| {
+fn check_claims(results: &mut LevelResults) {
+    let vector = results.vector;
+    let mut row = |about: &Name, expected: Answer, got: Answer| {
         let subject = [ORACLE, CullingTest::Exact.name()];
         let status = Status::of(expected == got);
-        sheet.row(Some(about), subject, status, expected, got);
+        results.add_row(Some(about), subject, status, expected, got);
     };
     if !vector.planes_agree() {
         let about = Name("planes".to_owned());
@@ -198,7 +198,7 @@ fn claims(sheet: &mut Sheet) {
         let zero = finite.zip(0..).filter(|(p, _)| p.normal == Vec3::ZERO);
         let found: Names = zero.map(|(_, n): (_, u32)| Name(n.to_string())).collect();
         let about = Name("degenerate_planes".to_owned());
-        row(&about, Said::of_names(wanted), Said::of_names(&found));
+        row(&about, Answer::of_names(wanted), Answer::of_names(&found));
     }
     let boxes = vector.boxes().map(|b| (&b.id, b.bounds().is_empty()));
     let boxes: BTreeMap<&Name, bool> = boxes.collect();
@@ -215,7 +215,7 @@ fn claims(sheet: &mut Sheet) {
 }
 
 /// Returns the message of a build that must refuse this item, or the wrong outcome.
-fn refused(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Result<String, String> {
+fn refusal(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Result<String, String> {
     match built {
         Err(error @ BuildError::NonFiniteItem { item, .. }) if item == wanted => {
             Ok(error.to_string())
@@ -228,12 +228,12 @@ fn refused(built: Result<Box<dyn DynIndex>, BuildError>, wanted: usize) -> Resul
 /// Returns the volume if it exists and should; else adds a row per structure.
 ///
 /// `declared` is the declared refusal, `otherwise` the expected outcome without one.
-fn accepted<V>(
-    sheet: &mut Sheet,
+fn accept<V>(
+    results: &mut LevelResults,
     [test, kind]: [&str; 2],
     volume: Result<V, String>,
-    declared: Option<Said>,
-    otherwise: Said,
+    declared: Option<Answer>,
+    otherwise: Answer,
     structures: &[Built],
 ) -> Option<V> {
     let (status, got) = match (volume, &declared) {
@@ -245,44 +245,44 @@ fn accepted<V>(
     let expected = declared.unwrap_or(otherwise);
     for (structure, _) in structures {
         let subject = [*structure, test];
-        sheet.row(None, subject, status, expected.clone(), got.clone());
+        results.add_row(None, subject, status, expected.clone(), got.clone());
     }
     None
 }
 
-fn given_planes(sheet: &mut Sheet, volume: Result<ConvexVolume, String>, built: &[Built]) {
-    let vector = sheet.vector;
+fn check_planes(results: &mut LevelResults, volume: Result<ConvexVolume, String>, built: &[Built]) {
+    let vector = results.vector;
     let test = CullingTest::SixPlane.name();
-    let declared = vector.planes_error().map(Said::from);
+    let declared = vector.planes_error().map(Answer::from);
     let wanted = "planes".into();
-    let Some(volume) = accepted(sheet, [test, "planes"], volume, declared, wanted, built) else {
+    let Some(volume) = accept(results, [test, "planes"], volume, declared, wanted, built) else {
         return;
     };
-    let scalar = || sheet.names_of(|b| volume.sees(b));
+    let scalar = || results.names_of(|b| volume.sees(b));
     let observed = vector.observed_f32_pvertex_mul_add.clone();
     let wanted = observed.unwrap_or_else(scalar);
     for (structure, built) in built {
-        let answer = sheet.query(built, (&volume).into(), |_| true);
+        let answer = results.query(built, (&volume).into(), |_| true);
         let explain = |b: &Aabb, _| Some(explain_visibility(b, &volume));
-        sheet.compared([structure, test], &wanted, &answer, explain);
+        results.add_comparison([structure, test], &wanted, &answer, explain);
     }
     let (six, exact) = (CullingTest::SixPlane, &vector.p_vertex_exact_visible);
     // Exact sums require finite numbers.
     if exact.is_some() {
-        sheet.seen(six, exact, sheet.names_of(|b| sees_exactly(&volume, b)));
+        results.add_visible(six, exact, results.names_of(|b| sees_exactly(&volume, b)));
     }
     let fused = &vector.observed_f32_pvertex_fma;
-    sheet.seen(six, fused, sheet.names_of(|b| sees_fused(&volume, b)));
+    results.add_visible(six, fused, results.names_of(|b| sees_fused(&volume, b)));
     let (visible, touch) = (&vector.expected_visible_planes, &vector.touch_planes);
-    sheet.verdicts(&Oracle::of_volume(&volume), visible, touch);
+    results.add_oracle(&Oracle::of_volume(&volume), visible, touch);
 }
 
 /// Checks point location.
 ///
 /// The query is rounded to f32, so it may find too many boxes for an f64 point: only those that
 /// contain the point as written count.
-fn points(sheet: &mut Sheet, built: &[Built]) {
-    let vector = sheet.vector;
+fn check_points(results: &mut LevelResults, built: &[Built]) {
+    let vector = results.vector;
     for (structure, built) in built {
         for point in vector.points() {
             let (p, wanted) = (point.p(), &point.expected_containing);
@@ -290,10 +290,10 @@ fn points(sheet: &mut Sheet, built: &[Built]) {
                 let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
                 p.cmpge(min).all() && p.cmple(max).all()
             };
-            let answer = sheet.query(built, p.as_vec3().into(), holds);
+            let answer = results.query(built, p.as_vec3().into(), holds);
             let is_right = answer.iter().flatten().eq(wanted) && answer.is_ok();
             let subject = [*structure, "locate"];
-            sheet.answered(Some(&point.id), subject, is_right, wanted, &answer);
+            results.add_answer(Some(&point.id), subject, is_right, wanted, &answer);
         }
     }
 }

@@ -26,7 +26,7 @@ pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
 pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
 
 /// Narrowest angle of view that the camera oracle supports, degrees.
-const CARRIED_DEG: f64 = 1e-12;
+const MIN_FOV_DEG: f64 = 1e-12;
 
 /// Derivations of planes from which those in a file may come.
 const METHODS: &str = "given frame_f32 gh_gl_f32 gh_gl_f32_raw gh_revz_f32";
@@ -43,9 +43,9 @@ pub struct Vector {
     plane_method: Option<Value>,
     normals: Option<Value>,
     semantics: Option<Value>,
-    planes: Option<Vec<Array<Narrow, 4>>>,
+    planes: Option<Vec<Array<F32, 4>>>,
     /// Bit patterns that replace `planes` if a file has both.
-    planes_f32_hex: Option<Vec<Array<Bits, 4>>>,
+    planes_f32_hex: Option<Vec<Array<F32Bits, 4>>>,
     /// Camera that the boxes are culled for.
     pub camera: Option<VectorCamera>,
     boxes: Option<Vec<VectorBox>>,
@@ -64,8 +64,8 @@ pub struct Vector {
     pub observed_f32_pvertex_fma: Option<Names>,
     /// Answer of the six-plane test without any rounding.
     pub p_vertex_exact_visible: Option<Names>,
-    expect_camera_error: Option<Declared>,
-    expect_planes_error: Option<Declared>,
+    expect_camera_error: Option<ExpectedError>,
+    expect_planes_error: Option<ExpectedError>,
     /// Indices of the planes with a zero normal, among the finite planes.
     pub degenerate_planes: Option<Names>,
     /// Boxes that must be refused because a bound is not finite.
@@ -77,13 +77,13 @@ pub struct Vector {
 /// Camera as stated by a file, possibly impossible.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct VectorCamera {
-    eye: Array<Number, 3>,
-    look: Array<Number, 3>,
-    up: Array<Number, 3>,
-    fovy_deg: Number,
-    aspect: Number,
-    near: Number,
-    far: Option<Number>,
+    eye: Array<F64, 3>,
+    look: Array<F64, 3>,
+    up: Array<F64, 3>,
+    fovy_deg: F64,
+    aspect: F64,
+    near: F64,
+    far: Option<F64>,
 }
 
 /// A box by its name.
@@ -91,8 +91,8 @@ pub struct VectorCamera {
 pub struct VectorBox {
     /// Name, unique in its vector.
     pub id: Name,
-    lo: Array<Narrow, 3>,
-    hi: Array<Narrow, 3>,
+    lo: Array<F32, 3>,
+    hi: Array<F32, 3>,
 }
 
 /// A point and the boxes that contain it.
@@ -100,7 +100,7 @@ pub struct VectorBox {
 pub struct VectorPoint {
     /// Name of the point.
     pub id: Name,
-    p: Array<Number, 3>,
+    p: Array<F64, 3>,
     /// Names of the boxes that contain it, bounds included.
     pub expected_containing: Names,
 }
@@ -116,8 +116,8 @@ impl VectorCamera {
     }
 
     /// Returns `true` if the oracle represents the angles of the lens without loss.
-    pub fn is_carried(&self) -> bool {
-        self.fovy_deg.0 * self.aspect.0.min(1.0) >= CARRIED_DEG
+    pub fn is_supported(&self) -> bool {
+        self.fovy_deg.0 * self.aspect.0.min(1.0) >= MIN_FOV_DEG
     }
 
     /// Camera with these numbers.
@@ -136,7 +136,7 @@ impl VectorCamera {
 impl VectorBox {
     /// Box as stated; its bounds may be inverted or not finite.
     pub fn bounds(&self) -> Aabb {
-        let corner = |row: Array<Narrow, 3>| Vec3::from(row.0.map(|x| x.0));
+        let corner = |row: Array<F32, 3>| Vec3::from(row.0.map(|x| x.0));
         Aabb::new(corner(self.lo), corner(self.hi))
     }
 }
@@ -185,7 +185,7 @@ impl Vector {
     ///
     /// A list without names makes no claim. Planes that must be refused may have names: the
     /// format's generator lists what the finite ones among them leave visible.
-    fn unjudged(&self) -> impl Iterator<Item = &'static str> {
+    fn unchecked(&self) -> impl Iterator<Item = &'static str> {
         let seen = !self.named(Level::Camera).is_empty();
         let of_planes = !self.named(Level::Planes).is_empty();
         let (no_camera, no_planes) = (self.camera.is_none(), self.planes().is_none());
@@ -225,7 +225,7 @@ impl Vector {
 
     /// True unless `planes` and `planes_f32_hex` are both given and differ.
     pub fn planes_agree(&self) -> bool {
-        let equal = |(a, b): (&Bits, &Narrow)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
+        let equal = |(a, b): (&F32Bits, &F32)| a.0 == b.0 || a.0.is_nan() && b.0.is_nan();
         let both = self.planes_f32_hex.as_ref().zip(self.planes.as_ref());
         both.is_none_or(|(bits, decimals)| {
             let mut rows = bits.iter().zip(decimals);
@@ -244,7 +244,7 @@ impl Vector {
     }
 }
 
-fn vector(row: Array<Number, 3>) -> DVec3 {
+fn vector(row: Array<F64, 3>) -> DVec3 {
     DVec3::from(row.0.map(|x| x.0))
 }
 
@@ -285,7 +285,7 @@ pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>> {
         unique(file, &of("boxes"), vector.boxes().map(|b| &b.id))?;
         unique(file, &of("points"), vector.points().map(|p| &p.id))?;
     }
-    note_unjudged(&vectors, file);
+    note_unchecked(&vectors, file);
     note_unknown(bytes, file, vectors.len());
     Ok(vectors)
 }
@@ -299,10 +299,10 @@ fn list(bytes: &[u8]) -> Result<Vec<Vector>, JsonError> {
 }
 
 /// Prints a note for each kind of claim that is not checked, once.
-fn note_unjudged(vectors: &[Vector], file: &str) {
-    let mut told = BTreeSet::new();
+fn note_unchecked(vectors: &[Vector], file: &str) {
+    let mut noted = BTreeSet::new();
     for (n, vector) in vectors.iter().enumerate() {
-        for found in vector.unjudged().filter(|&found| told.insert(found)) {
+        for found in vector.unchecked().filter(|&found| noted.insert(found)) {
             note(&format!("{file}, vectors[{n}]: {found}; not judged"));
         }
     }
@@ -381,21 +381,21 @@ pub struct Name(pub String);
 
 /// An f64, or a word for a value that JSON does not have.
 #[derive(Clone, Copy, Debug)]
-struct Number(f64);
+struct F64(f64);
 
 /// An f32, exact or in the fewest decimals that round-trip.
 ///
 /// The expected answers are about this very number; it is infinite beyond f32's range.
 #[derive(Clone, Copy, Debug)]
-struct Narrow(f32);
+struct F32(f32);
 
 /// Bits of an f32 in hexadecimal: "0x3f800000".
 #[derive(Clone, Copy, Debug)]
-struct Bits(f32);
+struct F32Bits(f32);
 
 /// Expected error, in words; `false` means none.
 #[derive(Clone, Debug)]
-struct Declared(Option<String>);
+struct ExpectedError(Option<String>);
 
 /// A row of `N` values.
 #[derive(Clone, Copy, Debug)]
@@ -446,27 +446,27 @@ written_as! {
     visit_u64(u64, Unsigned) |number| Some(Name(number.to_string()));
 }
 written_as! {
-    Number, "a number, NaN, Infinity or -Infinity",
-    visit_str(&str, Str) |text| word(text).map(Number);
-    visit_f64(f64, Float) |number| Some(Number(number));
-    visit_u64(u64, Unsigned) |number| Some(Number(number as f64));
-    visit_i64(i64, Signed) |number| Some(Number(number as f64));
+    F64, "a number, NaN, Infinity or -Infinity",
+    visit_str(&str, Str) |text| word(text).map(F64);
+    visit_f64(f64, Float) |number| Some(F64(number));
+    visit_u64(u64, Unsigned) |number| Some(F64(number as f64));
+    visit_i64(i64, Signed) |number| Some(F64(number as f64));
 }
 written_as! {
-    Narrow, "a number that f32 holds",
-    visit_str(&str, Str) |text| word(text).map(|x| Narrow(x as f32));
-    visit_f64(f64, Float) narrow;
-    visit_u64(u64, Unsigned) |number| narrow(number as f64);
-    visit_i64(i64, Signed) |number| narrow(number as f64);
+    F32, "a number that f32 holds",
+    visit_str(&str, Str) |text| word(text).map(|x| F32(x as f32));
+    visit_f64(f64, Float) f32_of;
+    visit_u64(u64, Unsigned) |number| f32_of(number as f64);
+    visit_i64(i64, Signed) |number| f32_of(number as f64);
 }
 written_as! {
-    Bits, "the 32 bits of an f32 such as \"0x3f800000\"",
+    F32Bits, "the 32 bits of an f32 such as \"0x3f800000\"",
     visit_str(&str, Str) bits;
 }
 written_as! {
-    Declared, "the error in words",
-    visit_bool(bool, Bool) |is_wrong| Some(Declared(is_wrong.then(|| "an error".to_owned())));
-    visit_str(&str, Str) |text| Some(Declared(Some(text.to_owned())));
+    ExpectedError, "the error in words",
+    visit_bool(bool, Bool) |is_wrong| Some(ExpectedError(is_wrong.then(|| "an error".to_owned())));
+    visit_str(&str, Str) |text| Some(ExpectedError(Some(text.to_owned())));
 }
 
 fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
@@ -481,19 +481,19 @@ fn word(text: &str) -> Option<f64> {
     text.parse().ok().filter(|_| is_word)
 }
 
-fn narrow(number: f64) -> Option<Narrow> {
-    let narrow = number as f32;
-    let is_shortest = || narrow.to_string().parse() == Ok(number);
-    let is_held = !narrow.is_finite() || f64::from(narrow) == number || is_shortest();
-    is_held.then_some(Narrow(narrow))
+fn f32_of(number: f64) -> Option<F32> {
+    let f32_of = number as f32;
+    let is_shortest = || f32_of.to_string().parse() == Ok(number);
+    let is_held = !f32_of.is_finite() || f64::from(f32_of) == number || is_shortest();
+    is_held.then_some(F32(f32_of))
 }
 
-fn bits(text: &str) -> Option<Bits> {
+fn bits(text: &str) -> Option<F32Bits> {
     let bare = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
     let digits = bare.unwrap_or(text);
     let is_sound = digits.len() == 8 && digits.bytes().all(|b| b.is_ascii_hexdigit());
     let bits = u32::from_str_radix(digits, 16).ok().filter(|_| is_sound)?;
-    Some(Bits(f32::from_bits(bits)))
+    Some(F32Bits(f32::from_bits(bits)))
 }
 
 #[cfg(test)]

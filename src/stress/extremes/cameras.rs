@@ -38,11 +38,11 @@ struct Hull {
 }
 
 /// Depth / near up to which an infinite volume is probed.
-const DEEP: f64 = 1e4;
+const FAR_OVER_NEAR: f64 = 1e4;
 
 impl Hull {
     fn of(camera: &Camera, around: &Surroundings) -> Option<Hull> {
-        let deep = (camera.lens.near() * DEEP).min(FARTHEST);
+        let deep = (camera.lens.near() * FAR_OVER_NEAR).min(FARTHEST);
         let far = camera.lens.far().unwrap_or(deep);
         let lens = camera.lens.with_far(Some(far)).ok()?;
         let frame = camera.frame.relative_to(around.origin);
@@ -83,7 +83,7 @@ pub fn adversarial(
             continue;
         }
         let mut b = match rng.below(8) {
-            0 => astray(rng, &hull),
+            0 => away_from_hull(rng, &hull),
             _ => touching(rng, &hull, shapes),
         };
         if rng.below(64) == 0 {
@@ -147,7 +147,7 @@ fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
 /// A box well inside the volume, beside, behind or before it.
 ///
 /// Reveals a plane that is missing or far off.
-fn astray(rng: &mut SeededRng, hull: &Hull) -> Aabb {
+fn away_from_hull(rng: &mut SeededRng, hull: &Hull) -> Aabb {
     let (s, t) = (rng.between(-0.5, 1.5), rng.between(-0.5, 1.5));
     // Size of the near face relative to the depth of the volume.
     let near = (hull.corners[0] - hull.corners[3]).length();
@@ -198,7 +198,7 @@ pub struct CameraFamily {
     /// Name of a variant, used in ids.
     pub label: fn(f64) -> String,
     /// Changes an ordinary camera into one of the family, given the parameter.
-    adjust: fn(&mut Draft, &mut SeededRng, f64),
+    adjust: fn(&mut CameraBuilder, &mut SeededRng, f64),
 }
 
 /// Distances from the origin.
@@ -210,92 +210,92 @@ const RATIOS: &[f64] = &[1e3, 1e6, 1e9, f64::INFINITY];
 /// All families of cameras, in the order of the table of results.
 pub static CAMERA_FAMILIES: &[CameraFamily] = rows! { CameraFamily { name, variants, label, adjust }
     // Far / near from 1e3 to 1e9, and infinite.
-    "near-far", RATIOS, plain, |draft, _, ratio| draft.depth(ratio);
+    "near-far", RATIOS, plain, |builder, _, ratio| builder.depth(ratio);
     // As near-far, with planes from a reversed-Z matrix in f64.
-    "reversed-z", RATIOS, plain, |draft, _, ratio| {
-        draft.depth(ratio);
-        draft.planes.method = PlaneMethod::GhRevzF64;
+    "reversed-z", RATIOS, plain, |builder, _, ratio| {
+        builder.depth(ratio);
+        builder.planes.method = PlaneMethod::GhRevzF64;
     };
     // Vertical field of view from 1e-9 to 179.9999999 degrees.
     "fov", &[1e-9, 1e-6, 1e-3, 1.0, 90.0, 170.0, 179.99, 179.99999, 179.9999999], plain,
-        |draft, _, fov| draft.fovy_deg = fov;
+        |builder, _, fov| builder.fovy_deg = fov;
     // Width / height from 1e-8 to 1e8.
-    "aspect", &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8], plain, |draft, _, aspect| draft.aspect = aspect;
+    "aspect", &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8], plain, |builder, _, aspect| builder.aspect = aspect;
     // A camera 1e4 to 1e15 times its depth away from the scene's origin.
-    "offset", OFFSETS, plain, |draft, rng, offset| draft.carry_off(rng, offset);
+    "offset", OFFSETS, plain, |builder, rng, offset| builder.move_away(rng, offset);
     // As offset, in coordinates relative to a point near the camera.
-    "rebased", OFFSETS, plain, |draft, rng, offset| {
-        draft.carry_off(rng, offset);
-        draft.origin = draft.eye.round();
+    "rebased", OFFSETS, plain, |builder, rng, offset| {
+        builder.move_away(rng, offset);
+        builder.origin = builder.eye.round();
     };
     // Up within 1e-6 to 1e-15 rad of the direction of view.
-    "condition", &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15], plain, |draft, rng, angle| {
-        draft.until_it_has_a_frame(rng, |draft, rng| {
-            draft.to_look = rng.below(2) == 0;
+    "condition", &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15], plain, |builder, rng, angle| {
+        builder.redraw_until_valid(rng, |builder, rng| {
+            builder.to_look = rng.below(2) == 0;
             // Close to the view direction as f64 has it: rounding can bring one camera's up vector
             // too close to the view, whatever its length.
             let length = libm::exp2(rng.between(-4.0, 4.0));
-            let away = angle * draft.forward.length() / draft.up.length();
-            let across = draft.up * away * rng.between(0.9, 1.5);
-            draft.up = (draft.forward + across) * length;
+            let away = angle * builder.forward.length() / builder.up.length();
+            let across = builder.up * away * rng.between(0.9, 1.5);
+            builder.up = (builder.forward + across) * length;
         });
     };
     // Eye and look 1e-6 to 1e-15 of their coordinates apart.
-    "near-look", &[1e-6, 1e-9, 1e-12, 1e-15], plain, |draft, rng, share| {
-        draft.until_it_has_a_frame(rng, |draft, _| {
-            draft.to_look = true;
-            let size = draft.eye.abs().max_element();
-            draft.forward *= 4.0 * share * size / draft.forward.length();
+    "near-look", &[1e-6, 1e-9, 1e-12, 1e-15], plain, |builder, rng, share| {
+        builder.redraw_until_valid(rng, |builder, _| {
+            builder.to_look = true;
+            let size = builder.eye.abs().max_element();
+            builder.forward *= 4.0 * share * size / builder.forward.length();
         });
     };
     // A volume around zero, seen from 1e3 to 1e15 depths away.
-    "shell", &[1e3, 1e6, 1e9, 1e12, 1e15], plain, |draft, _, distance| {
-        let half = draft.far.unwrap_or(1.0) / 2.0;
+    "shell", &[1e3, 1e6, 1e9, 1e12, 1e15], plain, |builder, _, distance| {
+        let half = builder.far.unwrap_or(1.0) / 2.0;
         let distance = distance * half;
-        draft.eye = draft.forward.normalize() * -distance;
-        draft.fovy_deg = (half / distance).to_degrees();
-        (draft.near, draft.far) = (distance - half, Some(distance + half));
+        builder.eye = builder.forward.normalize() * -distance;
+        builder.fovy_deg = (half / distance).to_degrees();
+        (builder.near, builder.far) = (distance - half, Some(distance + half));
     };
     // The whole scene scaled by 2^-148 to 2^127; views that may overflow may be refused.
     "scale", &[-148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0],
-        |power| format!("2^{power}"), |draft, _, power| draft.scale(libm::exp2(power));
+        |power| format!("2^{power}"), |builder, _, power| builder.scale(libm::exp2(power));
     // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
-    "size-ratio", &[1e6], plain, |draft, _, _| draft.shapes = Shapes::Ratio;
+    "size-ratio", &[1e6], plain, |builder, _, _| builder.shapes = Shapes::Ratio;
     // Sixteen boxes, repeated.
-    "coincident", &[16.0], plain, |draft, _, _| draft.shapes = Shapes::Coincident;
+    "coincident", &[16.0], plain, |builder, _, _| builder.shapes = Shapes::Coincident;
     // Lines, plates and points without thickness.
-    "needles", &[64.0], plain, |draft, _, _| draft.shapes = Shapes::Needles;
+    "needles", &[64.0], plain, |builder, _, _| builder.shapes = Shapes::Needles;
     // A 90-degree camera on an integer grid with its boxes: exact ties and one-ulp shifts.
-    "ties", &[8.0, 64.0, 4096.0], plain, |draft, rng, far| {
-        draft.shapes = Shapes::Grid;
-        draft.eye = draft.eye.round();
-        draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
-        draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
-        (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
-        (draft.near, draft.far) = (1.0, Some(far));
+    "ties", &[8.0, 64.0, 4096.0], plain, |builder, rng, far| {
+        builder.shapes = Shapes::Grid;
+        builder.eye = builder.eye.round();
+        builder.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
+        builder.up = DVec3::new(builder.forward.z, builder.forward.x, builder.forward.y);
+        (builder.fovy_deg, builder.aspect) = (90.0, 1.0);
+        (builder.near, builder.far) = (1.0, Some(far));
     };
     // Orthographic, off-axis, and off-axis without a far plane.
     "lens", &[0.0, 1.0, 2.0],
         |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
-        |draft, rng, kind| {
-            let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);
+        |builder, rng, kind| {
+            let half = builder.near * libm::tan(builder.fovy_deg.to_radians() / 2.0);
             let shift = half * rng.between(-3.0, 3.0);
-            let window = [shift - half, shift + half, -half, half * draft.aspect];
-            let far = draft.far.unwrap_or(1.0);
-            draft.other_lens = Some(match kind as u32 {
-                0 => Lens::orthographic(far * rng.unit().max(0.01), draft.aspect, -far, far),
-                1 => Lens::off_axis(window, draft.near, draft.far),
-                _ => Lens::off_axis(window, draft.near, None),
+            let window = [shift - half, shift + half, -half, half * builder.aspect];
+            let far = builder.far.unwrap_or(1.0);
+            builder.other_lens = Some(match kind as u32 {
+                0 => Lens::orthographic(far * rng.unit().max(0.01), builder.aspect, -far, far),
+                1 => Lens::off_axis(window, builder.near, builder.far),
+                _ => Lens::off_axis(window, builder.near, None),
             });
         };
 };
 
 impl CameraFamily {
     /// Generates a camera for a parameter.
-    pub fn draft(&self, rng: &mut SeededRng, variant: f64) -> Draft {
-        let mut draft = Draft::any(rng);
-        (self.adjust)(&mut draft, rng, variant);
-        draft
+    pub fn builder(&self, rng: &mut SeededRng, variant: f64) -> CameraBuilder {
+        let mut builder = CameraBuilder::any(rng);
+        (self.adjust)(&mut builder, rng, variant);
+        builder
     }
 }
 
@@ -309,7 +309,7 @@ fn plain(value: f64) -> String {
 
 /// Camera under construction, as exact numbers.
 #[derive(Default)]
-pub struct Draft {
+pub struct CameraBuilder {
     eye: DVec3,
     forward: DVec3,
     up: DVec3,
@@ -329,11 +329,11 @@ pub struct Draft {
     pub shapes: Shapes,
 }
 
-impl Draft {
+impl CameraBuilder {
     /// An ordinary camera: depth around 10, within some 10 of the origin.
     ///
     /// Looks along an axis one time in four.
-    fn any(rng: &mut SeededRng) -> Draft {
+    fn any(rng: &mut SeededRng) -> CameraBuilder {
         let (forward, up) = loop {
             let (mut forward, up) = (rng.normal3(), rng.normal3());
             if rng.below(4) == 0 {
@@ -344,7 +344,7 @@ impl Draft {
             }
         };
         let far = libm::exp2(rng.between(1.0, 5.0));
-        Draft {
+        CameraBuilder {
             eye: (rng.point() - 0.5) * 20.0,
             forward,
             up,
@@ -352,25 +352,25 @@ impl Draft {
             aspect: rng.between(0.4, 2.5),
             near: far / libm::exp2(rng.between(2.0, 8.0)),
             far: Some(far),
-            ..Draft::default()
+            ..CameraBuilder::default()
         }
     }
 
     /// Redraws and adjusts ordinary cameras until the vectors make a frame.
-    fn until_it_has_a_frame(
+    fn redraw_until_valid(
         &mut self,
         rng: &mut SeededRng,
-        adjust: impl Fn(&mut Draft, &mut SeededRng),
+        adjust: impl Fn(&mut CameraBuilder, &mut SeededRng),
     ) {
         adjust(self, rng);
         while self.pose().frame().is_err() {
-            *self = Draft::any(rng);
+            *self = CameraBuilder::any(rng);
             adjust(self, rng);
         }
     }
 
     /// Moves the eye by `offset` on each axis, in a random octant.
-    fn carry_off(&mut self, rng: &mut SeededRng, offset: f64) {
+    fn move_away(&mut self, rng: &mut SeededRng, offset: f64) {
         self.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
     }
 

@@ -11,8 +11,8 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, Input, StructureSpec};
 use crate::oracle::Verdict;
 use crate::query::{AnyVolume, ItemId};
-use crate::stress::Said;
-use crate::stress::sheet::slack;
+use crate::stress::Answer;
+use crate::stress::level_results::slack;
 use crate::verify::{self, ErrorCount, Trial, Truth, scan};
 
 /// Name of the scalar loop in the column of structures.
@@ -20,7 +20,7 @@ pub const SCALAR: &str = "scalar";
 
 /// Sums over cases.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
-pub struct Tally {
+pub struct VerdictCounts {
     /// Boxes with a verdict at camera level.
     pub boxes: u64,
     /// Boxes that touch the volume or are too close to decide.
@@ -30,16 +30,16 @@ pub struct Tally {
     /// Views that were refused because their sums could overflow.
     pub refused: u64,
     /// Boxes that the six-plane test would lose without its epsilon.
-    pub lost_bare: u64,
+    pub lost_without_epsilon: u64,
 }
 
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Tally) {
+impl std::ops::AddAssign for VerdictCounts {
+    fn add_assign(&mut self, other: VerdictCounts) {
         self.boxes += other.boxes;
         self.ties += other.ties;
         self.errors += other.errors;
         self.refused += other.refused;
-        self.lost_bare += other.lost_bare;
+        self.lost_without_epsilon += other.lost_without_epsilon;
     }
 }
 
@@ -51,7 +51,7 @@ pub struct Fault {
     /// Index of the box; `None` if the whole answer is wrong.
     pub item: Option<usize>,
     /// Expected answer.
-    pub expected: Said,
+    pub expected: Answer,
     /// Actual answer.
     pub got: String,
     /// Description of the box and its truth, so that a reader can check by hand.
@@ -67,7 +67,7 @@ pub struct Findings {
     /// Number of boxes.
     pub boxes: u64,
     /// Verdicts of the oracle at camera level.
-    pub tally: Tally,
+    pub tally: VerdictCounts,
     /// Structure and test of each check.
     pub checked: Vec<[String; 2]>,
     /// Faults in the order found.
@@ -92,7 +92,7 @@ impl Findings {
         &mut self,
         subject: [&str; 2],
         item: Option<usize>,
-        expected: impl Into<Said>,
+        expected: impl Into<Answer>,
         got: String,
     ) {
         self.faults.push(Fault {
@@ -119,10 +119,10 @@ impl Findings {
     /// Compares every structure with the scalar loop over the same items.
     pub fn compare(&mut self, built: &Built, test: &str, volume: AnyVolume<'_>, items: &[Aabb]) {
         let mut trial = Trial::new(items.len());
-        trial.see(items, volume);
+        trial.set_view(items, volume);
         for (structure, index) in built {
             self.check([structure, test]);
-            let answer = trial.ask(|out| index.query(volume, out)).map(drop);
+            let answer = trial.run(|out| index.query(volume, out)).map(drop);
             let Err(fault) = answer else { continue };
             let expected = format!("the {} items of the scalar loop", trial.expected);
             let (expected, first) = match &fault {
@@ -187,11 +187,11 @@ impl Case {
         let boxes = self.items.len() as u64;
         let mut found = Findings {
             boxes,
-            tally: Tally {
+            tally: VerdictCounts {
                 boxes,
                 ties: verdicts.filter(|v| **v == Verdict::Touch).count() as u64,
                 errors: self.truth.visible,
-                ..Tally::default()
+                ..VerdictCounts::default()
             },
             ..Findings::default()
         };
@@ -255,7 +255,7 @@ impl Case {
         };
         let six = six.as_any();
         let seen: Vec<ItemId> = scan(&self.items, |b| six.sees(b)).collect();
-        found.tally.lost_bare = self.errors(&seen).dropped();
+        found.tally.lost_without_epsilon = self.errors(&seen).dropped();
         found.compare(built, "six-plane epsilon 0", six, &self.items[..share]);
         let Ok(sphere) = view(CullingTest::Sphere) else {
             return;

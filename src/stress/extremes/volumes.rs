@@ -13,7 +13,7 @@ use crate::index::{Input, StructureSpec};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::AnyVolume;
 use crate::scene::SeededRng;
-use crate::stress::sheet::sees_exactly;
+use crate::stress::level_results::sees_exactly;
 use crate::verify::{RandomCase, explain_visibility};
 
 /// A family of cases at planes level.

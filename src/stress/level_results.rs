@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Level, Name, Names, Row, Said, Status, Vector};
+use super::{Answer, Level, Name, Names, Row, Status, Vector};
 use glam::DVec3;
 
 use crate::arithmetic::Expansion;
@@ -90,28 +90,28 @@ pub const ORACLE: &str = "oracle";
 pub type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
 
 /// Sorted names of the boxes that a query returned, or the reason for none.
-pub type Answer = Result<Vec<Name>, String>;
+pub type Returned = Result<Vec<Name>, String>;
 
 /// Results of one level of one vector.
-pub struct Sheet<'a> {
+pub struct LevelResults<'a> {
     pub vector: &'a Vector,
     pub level: Level,
     pub names: &'a [Name],
     pub items: &'a [Aabb],
     /// Index of each name.
-    pub places: &'a BTreeMap<&'a Name, usize>,
+    pub indices: &'a BTreeMap<&'a Name, usize>,
     pub rows: Vec<Row>,
 }
 
-impl Sheet<'_> {
+impl LevelResults<'_> {
     /// Adds a row about the whole vector, or about one of its boxes or points.
-    pub fn row(
+    pub fn add_row(
         &mut self,
         about: Option<&Name>,
         [structure, test]: [&str; 2],
         status: Status,
-        expected: impl Into<Said>,
-        got: impl Into<Said>,
+        expected: impl Into<Answer>,
+        got: impl Into<Answer>,
     ) {
         let id = &self.vector.id.0;
         self.rows.push(Row {
@@ -127,31 +127,31 @@ impl Sheet<'_> {
     }
 
     /// Adds the row of an answer; it fails if the answer has an empty box.
-    pub fn answered(
+    pub fn add_answer(
         &mut self,
         about: Option<&Name>,
         subject: [&str; 2],
         is_right: bool,
         wanted: &Names,
-        answer: &Answer,
+        answer: &Returned,
     ) {
         let empty = self.vector.expect_empty_boxes.as_ref();
         let is_empty = |name: &Name| empty.is_some_and(|names| names.contains(name));
         let has_empty = answer.iter().flatten().any(is_empty);
         let status = Status::of(is_right && !has_empty);
-        let got = answer.as_ref().map_or_else(Said::from, Said::of_names);
-        self.row(about, subject, status, Said::of_names(wanted), got);
+        let got = answer.as_ref().map_or_else(Answer::from, Answer::of_names);
+        self.add_row(about, subject, status, Answer::of_names(wanted), got);
     }
 
     /// Adds the row of an answer, and a row for each wrong box in it.
     ///
     /// `fault` describes a difference: a box, and whether it is wanted; `None` if the difference is
     /// allowed.
-    pub fn compared(
+    pub fn add_comparison(
         &mut self,
         subject: [&str; 2],
         wanted: &Names,
-        answer: &Answer,
+        answer: &Returned,
         fault: impl Fn(&Aabb, bool) -> Option<String>,
     ) {
         let found: Names = answer.iter().flatten().cloned().collect();
@@ -166,26 +166,26 @@ impl Sheet<'_> {
         }
         let is_unique = |names: &Vec<Name>| names.len() == found.len();
         let is_right = faults.is_empty() && answer.as_ref().is_ok_and(is_unique);
-        self.answered(None, subject, is_right, wanted, answer);
+        self.add_answer(None, subject, is_right, wanted, answer);
         for (name, is_wanted, got) in faults.into_iter().filter(|_| answer.is_ok()) {
             let expected = if is_wanted { "visible" } else { "not visible" };
-            self.row(Some(name), subject, Status::Fail, expected, got);
+            self.add_row(Some(name), subject, Status::Fail, expected, got);
         }
     }
 
     /// Adds a row for each name in the level's lists that no sound box has.
-    pub fn unknown_names(&mut self) {
+    pub fn add_unknown_names(&mut self) {
         let vector = self.vector;
         for name in vector.named(self.level) {
             if self.box_named(name).is_none() {
                 let subject = [ORACLE, CullingTest::Exact.name()];
-                self.row(Some(name), subject, Status::Fail, "a box", "no such box");
+                self.add_row(Some(name), subject, Status::Fail, "a box", "no such box");
             }
         }
     }
 
     fn box_named(&self, name: &Name) -> Option<&Aabb> {
-        self.items.get(*self.places.get(name)?)
+        self.items.get(*self.indices.get(name)?)
     }
 
     /// Names of the boxes that satisfy a condition.
@@ -196,7 +196,7 @@ impl Sheet<'_> {
     }
 
     /// Names of the finite boxes that the oracle sees.
-    pub fn seen_by(&self, oracle: &Oracle) -> Names {
+    pub fn visible_to(&self, oracle: &Oracle) -> Names {
         self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
     }
 
@@ -208,7 +208,7 @@ impl Sheet<'_> {
         built: &Result<Box<dyn DynIndex>, BuildError>,
         volume: AnyVolume<'_>,
         keep: impl Fn(&Aabb) -> bool,
-    ) -> Answer {
+    ) -> Returned {
         let index = built.as_ref().map_err(BuildError::to_string)?;
         let (mut plain, mut counted) = (Vec::new(), Vec::new());
         caught(|| {
@@ -230,20 +230,20 @@ impl Sheet<'_> {
     }
 
     /// Adds the row of the boxes that a test sees, if the file lists them.
-    pub fn seen(&mut self, test: CullingTest, listed: &Option<Names>, seen: Names) {
+    pub fn add_visible(&mut self, test: CullingTest, listed: &Option<Names>, seen: Names) {
         if let Some(listed) = listed {
             let got = Ok(seen.iter().cloned().collect());
-            self.answered(None, [ORACLE, test.name()], seen == *listed, listed, &got);
+            self.add_answer(None, [ORACLE, test.name()], seen == *listed, listed, &got);
         }
     }
 
     /// Adds rows that compare the oracle's verdicts with the lists of the file.
-    pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
+    pub fn add_oracle(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
         let mut wrong = Vec::new();
         let boxes = self.names.iter().zip(self.items);
         for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
-            let judgement = oracle.judge(b);
-            let found = judgement.verdict;
+            let class = oracle.classify(b);
+            let found = class.verdict;
             let lists = |list: &Option<Names>| list.as_ref().map(|names| names.contains(name));
             let wanted = match (lists(visible), lists(touch)) {
                 // A touch counts as visible, so the two lists contradict each other.
@@ -258,17 +258,17 @@ impl Sheet<'_> {
             };
             // The view is narrower than the oracle's precision: an undecided touch counts as
             // visible.
-            let is_narrow = || self.vector.camera.is_some_and(|c| !c.is_carried());
-            let is_visible = judgement.undecided && wanted != Verdict::Out && is_narrow();
+            let is_narrow = || self.vector.camera.is_some_and(|c| !c.is_supported());
+            let is_visible = class.undecided && wanted != Verdict::Out && is_narrow();
             if found != wanted && !is_visible {
                 wrong.push((name, wanted, format!("{found:?}").to_lowercase()));
             }
         }
-        self.seen(CullingTest::Exact, visible, self.seen_by(oracle));
+        self.add_visible(CullingTest::Exact, visible, self.visible_to(oracle));
         let subject = [ORACLE, CullingTest::Exact.name()];
         for (name, expected, got) in wrong {
             let expected = format!("{expected:?}").to_lowercase();
-            self.row(Some(name), subject, Status::Fail, expected, got);
+            self.add_row(Some(name), subject, Status::Fail, expected, got);
         }
     }
 }
