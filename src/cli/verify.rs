@@ -288,9 +288,9 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         let case = RandomCase::new(case_seed);
         let mut trials = [(); 3].map(|()| Trial::new(case.items.len()));
         let [seen, holding, overlapping] = &mut trials;
-        seen.see(&case.items, &case.volume);
-        holding.expect(Regions::Items.holding(case.point, &case.items));
-        overlapping.expect(case.overlapping());
+        seen.set_view(&case.items, &case.volume);
+        holding.set_expected(Regions::Items.holding(case.point, &case.items));
+        overlapping.set_expected(case.overlapping());
         for (spec, check) in structures.iter().zip(&mut checks) {
             check.volumes += 1;
             check.verdicts += 3 * case.items.len() as u64;
@@ -330,11 +330,11 @@ fn differ(
 ) -> Result<(), Verdict> {
     let item = |id: usize| case.items.get(id);
     let visible = |id| Some(explain_visibility(item(id)?, &case.volume));
-    seen.ask(|out| index.visible(&case.volume, out))
+    seen.run(|out| index.visible(&case.volume, out))
         .map_err(|fault| Verdict::of(&fault, "", visible))?;
     let holds = |id| Some(explain_containment(item(id)?, case.point));
     let out = holding
-        .ask(|out| index.locate(case.point, out))
+        .run(|out| index.locate(case.point, out))
         .map_err(|fault| Verdict::of(&fault, "region search: ", holds))?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
@@ -353,8 +353,8 @@ fn differ(
     }
     let volume = ConvexVolume::of_box(&case.region);
     let overlaps = |id| Some(format!("{:?} by {:?}", item(id)?, case.region));
-    let asked = overlapping.ask(|out| index.visible(&volume, out));
-    asked.map_err(|fault| Verdict::of(&fault, "search by a box: ", overlaps))?;
+    let answer = overlapping.run(|out| index.visible(&volume, out));
+    answer.map_err(|fault| Verdict::of(&fault, "search by a box: ", overlaps))?;
     Ok(())
 }
 

@@ -88,8 +88,8 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
         };
         for n in 0..queries {
             match pass {
-                Pass::Queries => trial.see(&workload.items, workload.views[n].as_any()),
-                Pass::Searches => trial.expect(scene.holding(&workload.sought[n])),
+                Pass::Queries => trial.set_view(&workload.items, workload.views[n].as_any()),
+                Pass::Searches => trial.set_expected(scene.holding(&workload.sought[n])),
             }
             for (i, subject) in subjects.iter().enumerate() {
                 let counted = &mut all[i];
@@ -101,11 +101,11 @@ pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> 
                 notice(Some(&subjects[i].spec.label), "counting");
                 let start = Instant::now();
                 let cost = &mut counted.costs[pass as usize];
-                let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));
-                // The timed traversal is compiled without the recorder: it is checked as well.
+                let counting = trial.run(|out| built.count(workload, pass, n, out, cost));
+                // The timed traversal is compiled without the recorder: checked as well.
                 let timed = |out: &mut Vec<ItemId>| built.answer(workload, pass, n, out);
                 let answered = counting.map(drop);
-                let answered = answered.and_then(|()| trial.ask(timed).map(drop));
+                let answered = answered.and_then(|()| trial.run(timed).map(drop));
                 spent[i] += start.elapsed();
                 let explain = |id: usize| match pass {
                     Pass::Queries => {

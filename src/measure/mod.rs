@@ -188,8 +188,8 @@ fn compare_with_scan(
     answer: impl FnOnce(&mut Vec<ItemId>),
 ) -> Result<(), Verdict> {
     let mut trial = Trial::new(items.len());
-    trial.see(items, volume);
-    trial.ask(answer).map(drop).map_err(|fault| {
+    trial.set_view(items, volume);
+    trial.run(answer).map(drop).map_err(|fault| {
         let why = |id: usize| Some(explain_visibility(items.get(id)?, volume));
         Verdict::of(&fault, &format!("{place}: "), why)
     })

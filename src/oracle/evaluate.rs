@@ -37,7 +37,7 @@ impl Precision {
         self.tolerance == 0.0
     }
 
-    fn cut(self, value: Expansion) -> Expansion {
+    fn truncate(self, value: Expansion) -> Expansion {
         match value.terms().len() > self.terms {
             true => value.leading(self.terms),
             false => value,
@@ -45,7 +45,7 @@ impl Precision {
     }
 
     pub fn add(self, a: &Number, b: &Number) -> Number {
-        Number::new(self.cut(&a.value + &b.value), a.size + b.size)
+        Number::new(self.truncate(&a.value + &b.value), a.size + b.size)
     }
 
     pub fn subtract(self, a: &Number, b: &Number) -> Number {
@@ -53,7 +53,7 @@ impl Precision {
     }
 
     pub fn multiply(self, a: &Number, b: &Number) -> Number {
-        Number::new(self.cut(&a.value * &b.value), a.size * b.size)
+        Number::new(self.truncate(&a.value * &b.value), a.size * b.size)
     }
 
     /// Sum of products.

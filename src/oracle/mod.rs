@@ -29,7 +29,7 @@ pub enum Verdict {
 
 /// A verdict, and whether it is proven.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Judgement {
+pub struct Classification {
     /// Verdict, as far as it is proven.
     pub verdict: Verdict,
     /// True for a tie too close to decide at camera level, which counts as a touch.
@@ -104,34 +104,34 @@ impl Oracle {
     ///
     /// Meaningless for other bounds. An inverted box is empty, and so OUT.
     pub fn verdict(&self, b: &Aabb) -> Verdict {
-        self.judge(b).verdict
+        self.classify(b).verdict
     }
 
     /// Verdict, and whether it is proven; at planes level it always is.
-    pub fn judge(&self, b: &Aabb) -> Judgement {
-        self.judge_wide(b.min.as_dvec3(), b.max.as_dvec3())
+    pub fn classify(&self, b: &Aabb) -> Classification {
+        self.classify_f64(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
     /// Verdict about an f64 box with finite corners of at most 1e60.
-    pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
+    pub fn classify_f64(&self, min: DVec3, max: DVec3) -> Classification {
         let corners = &Corners { min, max };
-        let judged = |verdict, undecided| Judgement { verdict, undecided };
+        let classified = |verdict, undecided| Classification { verdict, undecided };
         if corners.is_empty() || self.extent == Extent::Empty {
-            return judged(Verdict::Out, false);
+            return classified(Verdict::Out, false);
         }
         let mut least = if self.extent == Extent::Flat { 0 } else { 1 };
         for i in 0..self.filter.len() {
-            if i == self.faces && least > 0 && self.witnessed(corners) {
-                return judged(Verdict::In, false);
+            if i == self.faces && least > 0 && self.has_inner_point(corners) {
+                return classified(Verdict::In, false);
             }
             match self.sign(i, corners) {
-                -1 => return judged(Verdict::Out, false),
+                -1 => return classified(Verdict::Out, false),
                 sign => least = least.min(sign),
             }
         }
         match least > 0 {
-            true => judged(Verdict::In, false),
-            false => judged(Verdict::Touch, !self.precision.is_exact()),
+            true => classified(Verdict::In, false),
+            false => classified(Verdict::Touch, !self.precision.is_exact()),
         }
     }
 
@@ -159,11 +159,11 @@ impl Oracle {
     /// # Ok::<(), cullbench::geometry::VolumeError>(())
     /// ```
     pub fn depth(&self, b: &Aabb) -> f64 {
-        self.depth_wide(b.min.as_dvec3(), b.max.as_dvec3())
+        self.depth_f64(b.min.as_dvec3(), b.max.as_dvec3())
     }
 
     /// Depth of an f64 box, as [`Oracle::depth`] defines it.
-    pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
+    pub fn depth_f64(&self, min: DVec3, max: DVec3) -> f64 {
         let corners = &Corners { min, max };
         if corners.is_empty() || self.extent == Extent::Empty {
             return f64::NEG_INFINITY;
@@ -207,7 +207,7 @@ impl Oracle {
     /// Returns `true` if a point of the box is certainly strictly inside all planes.
     ///
     /// Tests the point nearest to the volume's inner point, and the box's centre.
-    fn witnessed(&self, b: &Corners) -> bool {
+    fn has_inner_point(&self, b: &Corners) -> bool {
         let is_inside = |point: DVec3| {
             self.filter[..self.faces].iter().all(|face| {
                 let (value, error) = at(face, point);

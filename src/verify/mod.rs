@@ -104,9 +104,9 @@ mod tests {
             .collect();
         let half = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -2.5)]).unwrap();
         let mut trial = Trial::new(items.len());
-        trial.see(&items, &half);
+        trial.set_view(&items, &half);
         assert_eq!(trial.expected, 3);
-        assert!(trial.ask(|out| out.extend([5, 3, 4])).is_ok());
+        assert!(trial.run(|out| out.extend([5, 3, 4])).is_ok());
         let cases: [(&[ItemId], Difference); 5] = [
             (
                 &[3, 4],
@@ -150,9 +150,9 @@ mod tests {
             ),
         ];
         for (answer, wanted) in cases {
-            let found = trial.ask(|out| out.extend(answer)).unwrap_err();
+            let found = trial.run(|out| out.extend(answer)).unwrap_err();
             assert_eq!(found, Fault::Differs(wanted), "{answer:?}");
-            let right = trial.ask(|out| out.extend([3, 4, 5]));
+            let right = trial.run(|out| out.extend([3, 4, 5]));
             assert!(right.is_ok(), "state is restored");
         }
     }

@@ -46,13 +46,13 @@ impl Trial {
     /// Sets the query to the items that a view sees, by the reference scan.
     ///
     /// O(items * planes).
-    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
+    pub fn set_view<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
         let view = view.into();
-        self.expect(scan(items, |b| view.sees(b)));
+        self.set_expected(scan(items, |b| view.sees(b)));
     }
 
     /// Sets the query by its correct answer, ids below the number of items.
-    pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
+    pub fn set_expected(&mut self, right: impl IntoIterator<Item = ItemId>) {
         self.right.clear(self.items);
         self.expected = 0;
         for id in right {
@@ -67,9 +67,9 @@ impl Trial {
     ///
     /// # Errors
     /// A panic, or the difference of the answer.
-    pub fn ask(&mut self, ask: impl FnOnce(&mut Vec<ItemId>)) -> Result<&[ItemId], Fault> {
+    pub fn run(&mut self, query: impl FnOnce(&mut Vec<ItemId>)) -> Result<&[ItemId], Fault> {
         self.answer.clear();
-        caught(|| ask(&mut self.answer)).map_err(Fault::Panicked)?;
+        caught(|| query(&mut self.answer)).map_err(Fault::Panicked)?;
         let difference = self.compare();
         match difference == Difference::default() {
             true => Ok(&self.answer),
@@ -128,10 +128,10 @@ mod tests {
     #[test]
     fn right_wrong_and_panicking_answers_are_told_apart() {
         let mut trial = Trial::new(5);
-        trial.expect([1, 3]);
+        trial.set_expected([1, 3]);
         assert_eq!(trial.expected, 2);
-        assert_eq!(trial.ask(|out| out.extend([3, 1])), Ok(&[3, 1][..]));
-        let missed = trial.ask(|out| out.push(1)).unwrap_err();
+        assert_eq!(trial.run(|out| out.extend([3, 1])), Ok(&[3, 1][..]));
+        let missed = trial.run(|out| out.push(1)).unwrap_err();
         assert!(
             missed
                 .explained(|id| Some(format!("item {id}!")))
@@ -141,12 +141,12 @@ mod tests {
             panic!("{missed:?}");
         };
         assert_eq!((difference.missing, difference.extra), (1, 0));
-        let panicked = trial.ask(|_| panic!("deep in a peer's code"));
+        let panicked = trial.run(|_| panic!("deep in a peer's code"));
         assert_eq!(
             panicked,
             Err(Fault::Panicked("deep in a peer's code".to_owned()))
         );
         // A failed query leaves no state for the next.
-        assert!(trial.ask(|out| out.extend([1, 3])).is_ok());
+        assert!(trial.run(|out| out.extend([1, 3])).is_ok());
     }
 }

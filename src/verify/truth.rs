@@ -139,10 +139,10 @@ impl Truth {
             Some(_) => Some((of(DVec3::ZERO)?, originals.clone())),
             None => None,
         };
-        Some(Truth::judged(stored, written, items))
+        Some(Truth::new(stored, written, items))
     }
 
-    fn judged(oracle: Oracle, written: Option<(Oracle, Originals)>, items: &[Aabb]) -> Truth {
+    fn new(oracle: Oracle, written: Option<(Oracle, Originals)>, items: &[Aabb]) -> Truth {
         let mut truth = Truth {
             oracle,
             written,
@@ -150,13 +150,13 @@ impl Truth {
             visible: ErrorCount::default(),
         };
         for (id, item) in items.iter().enumerate() {
-            let judgement = match truth.as_written(id) {
-                Some((world, b)) => world.judge_wide(b.min, b.max),
-                None => truth.oracle.judge(item),
+            let found = match truth.as_written(id) {
+                Some((world, b)) => world.classify_f64(b.min, b.max),
+                None => truth.oracle.classify(item),
             };
-            truth.visible.visible += u64::from(judgement.verdict != Verdict::Out);
-            truth.visible.undecided += u64::from(judgement.undecided);
-            truth.verdicts.push(judgement.verdict);
+            truth.visible.visible += u64::from(found.verdict != Verdict::Out);
+            truth.visible.undecided += u64::from(found.undecided);
+            truth.verdicts.push(found.verdict);
         }
         truth
     }
@@ -164,7 +164,7 @@ impl Truth {
     /// Depth of item `id`, as written, in the volume.
     pub fn depth(&self, id: usize, item: &Aabb) -> f64 {
         match self.as_written(id) {
-            Some((world, b)) => world.depth_wide(b.min, b.max),
+            Some((world, b)) => world.depth_f64(b.min, b.max),
             None => self.oracle.depth(item),
         }
     }
@@ -243,7 +243,7 @@ mod tests {
         let cube = |x: f32| Aabb::around(Vec3::new(x, 0.0, 0.0), Vec3::ONE);
         // In, in, touching, out by one, out by four.
         let items = [cube(0.5), cube(5.0), cube(-1.0), cube(-2.0), cube(-5.0)];
-        let truth = Truth::judged(Oracle::of_volume(&half), None, &items);
+        let truth = Truth::new(Oracle::of_volume(&half), None, &items);
         let wanted = [
             Verdict::In,
             Verdict::In,

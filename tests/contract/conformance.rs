@@ -208,12 +208,12 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
             let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(path);
             let mut trial = Trial::new(scene.items.len());
             for view in &workload.views {
-                trial.see(&scene.items, view.as_any());
+                trial.set_view(&scene.items, view.as_any());
                 for (index, row) in built.iter().zip(Registry::builtin().rows()) {
-                    let asked = trial.ask(|out| index.query(view.as_any(), out));
+                    let answer = trial.run(|out| index.query(view.as_any(), out));
                     assert!(
-                        asked.is_ok(),
-                        "{} on {source}, {path}: {asked:?}",
+                        answer.is_ok(),
+                        "{} on {source}, {path}: {answer:?}",
                         row.info.name
                     );
                 }
@@ -280,15 +280,15 @@ fn own_tree_gives_the_reference_set(source: &str) {
                 .expect(name);
             let mut trial = Trial::new(items.len());
             for view in &workload.views {
-                trial.see(items, view.as_any());
-                let asked = trial.ask(|out| index.query(view.as_any(), out));
-                assert!(asked.is_ok(), "{name}");
+                trial.set_view(items, view.as_any());
+                let answer = trial.run(|out| index.query(view.as_any(), out));
+                assert!(answer.is_ok(), "{name}");
             }
             for &p in &workload.points {
                 let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
-                trial.expect(holding.map(|(_, id)| id));
-                let asked = trial.ask(|out| index.locate(p, out));
-                assert!(asked.is_ok(), "{name}");
+                trial.set_expected(holding.map(|(_, id)| id));
+                let answer = trial.run(|out| index.locate(p, out));
+                assert!(answer.is_ok(), "{name}");
             }
         }
     }

@@ -35,11 +35,11 @@ fn every_structure_is_right_in_every_frame_of_every_motion() {
                     structure.update(&mut index, input, &moved).unwrap();
                     let view = views[frame % views.len()].as_any();
                     for volume in [view, (&everything).into()] {
-                        trial.see(&items, volume);
-                        let asked = trial.ask(|ids| index.query(volume, ids));
+                        trial.set_view(&items, volume);
+                        let found = trial.run(|ids| index.query(volume, ids));
                         assert!(
-                            asked.is_ok(),
-                            "{} in frame {frame} of {spec}: {asked:?}",
+                            found.is_ok(),
+                            "{} in frame {frame} of {spec}: {found:?}",
                             structure.label
                         );
                     }
@@ -76,10 +76,10 @@ fn spheres_are_those_of_the_scan_in_every_frame() {
                 let input = input_of(&scene, &cubes).spheres(true);
                 structure.update(&mut index, input, moved).unwrap();
                 let view = workload.views[frame % way.cameras.len()].as_any();
-                trial.see(&cubes, view);
-                let asked = trial.ask(|ids| index.query(view, ids));
+                trial.set_view(&cubes, view);
+                let found = trial.run(|ids| index.query(view, ids));
                 let label = &structure.label;
-                assert!(asked.is_ok(), "{label}, frame {frame} of {spec}: {asked:?}");
+                assert!(found.is_ok(), "{label}, frame {frame} of {spec}: {found:?}");
             }
         }
     }

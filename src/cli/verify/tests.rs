@@ -50,7 +50,7 @@ fn a_wrong_answer_of_a_batch_names_the_point_and_the_first_item() {
     let linear = StructureSpec::parse("linear").expect("linear");
     let index = Batches(linear.build(&case.items).expect("two items"));
     let mut trials = [(); 3].map(|()| Trial::new(2));
-    trials.iter_mut().for_each(|trial| trial.expect([0, 1]));
+    trials.iter_mut().for_each(|t| t.set_expected([0, 1]));
     let reason = differ(&case, &index, &mut trials)
         .err()
         .and_then(|v| v.reason);

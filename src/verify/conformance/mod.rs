@@ -4,7 +4,7 @@
 //! makes a test of each; an error names the difference and the scene.
 
 mod behaviour;
-mod questions;
+mod queries;
 
 use std::ops::{ControlFlow, Range};
 
@@ -16,9 +16,9 @@ use crate::index::{BuildError, Input, RegionIndex};
 use crate::query::{ItemId, NoRecorder, Sink};
 use crate::scene::SeededRng;
 
-use questions::{
-    Outcome, Questions, ask, build, build_from, cases, each, edges, ensure, generated_scenes,
-    is_right, points, seen, sorted,
+use queries::{
+    Outcome, QuerySet, build, build_from, cases, each, edges, ensure, generated_scenes, ids_of,
+    is_right, points, query, sorted,
 };
 
 pub use behaviour::{
@@ -90,48 +90,48 @@ const SEEDS: Range<u64> = 0..64;
 ///
 /// In degenerate scenes, with planes that touch boxes.
 pub fn reference_set_on_edge_scenes<T: RegionIndex>() -> Outcome {
-    each(edges(), |asked, index: &mut T| {
-        asked.visible_is_right(index)
+    each(edges(), |queries, index: &mut T| {
+        queries.visible_is_right(index)
     })
 }
 
 /// Checks `visible` on [`RandomCase`](super::RandomCase)s, items in two orders.
 pub fn reference_set_on_random_cases<T: RegionIndex>() -> Outcome {
     let four_times = SEEDS.start..SEEDS.end * 4;
-    each(cases(four_times), |asked, index: &mut T| {
-        asked.visible_is_right(index)?;
-        let third = asked.items.len() / 3;
-        asked.items.reverse();
-        asked.items.rotate_left(third);
-        let right = asked.visible_is_right(&build::<T>(&asked.items)?);
+    each(cases(four_times), |queries, index: &mut T| {
+        queries.visible_is_right(index)?;
+        let third = queries.items.len() / 3;
+        queries.items.reverse();
+        queries.items.rotate_left(third);
+        let right = queries.visible_is_right(&build::<T>(&queries.items)?);
         right.map_err(|error| format!("in another order: {error}"))
     })
 }
 
 /// Checks `visible` on small generated worlds, with cameras.
 pub fn reference_set_on_generated_scenes<T: RegionIndex>() -> Outcome {
-    each(generated_scenes(1500)?, |asked, index: &mut T| {
-        asked.visible_is_right(index)
+    each(generated_scenes(1500)?, |queries, index: &mut T| {
+        queries.visible_is_right(index)
     })
 }
 
 /// Passes the answer for a case's first volume, or for its last point, to a sink.
 fn pass<T: RegionIndex, S: Sink>(
     index: &T,
-    case: &Questions,
+    case: &QuerySet,
     region_search: bool,
     sink: &mut S,
 ) -> ControlFlow<()> {
     match case.points.last() {
-        Some(p) if region_search => ask(index, p, sink, &mut NoRecorder),
-        _ => ask(index, &case.volumes[0], sink, &mut NoRecorder),
+        Some(p) if region_search => query(index, p, sink, &mut NoRecorder),
+        _ => query(index, &case.volumes[0], sink, &mut NoRecorder),
     }
 }
 
 /// Checks that the same items give the same ids in the same order.
 pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
-    each(cases(SEEDS), |asked, index: &mut T| {
-        let same = asked.answers(index) == asked.answers(&build::<T>(&asked.items)?);
+    each(cases(SEEDS), |queries, index: &mut T| {
+        let same = queries.answers(index) == queries.answers(&build::<T>(&queries.items)?);
         ensure(same, || "built twice, answered differently".to_owned())
     })
 }
@@ -170,7 +170,7 @@ pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
 /// A sink that breaks has received the first ids, and the query returns `Break`.
 pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
-    each(cases(SEEDS), |asked, index: &mut T| {
+    each(cases(SEEDS), |queries, index: &mut T| {
         for region_search in [false, true] {
             // Keeps the slices separate, and breaks at a given call.
             let until = |breaks_at: usize| {
@@ -182,11 +182,11 @@ pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
                         false => ControlFlow::Break(()),
                     }
                 };
-                let flow = pass(index, asked, region_search, &mut sink);
+                let flow = pass(index, queries, region_search, &mut sink);
                 (slices, flow)
             };
             let mut collected: Vec<ItemId> = Vec::new();
-            let ended = pass(index, asked, region_search, &mut collected);
+            let ended = pass(index, queries, region_search, &mut collected);
             let (all, flow) = until(usize::MAX);
             let same = all.concat() == collected && ended.is_continue() && flow.is_continue();
             ensure(same, || {

@@ -329,8 +329,8 @@ fn random_cameras_of_every_lens() {
             if !b.is_finite() {
                 continue;
             }
-            let found = oracle.judge(&b);
-            let wide = oracle.judge_wide(b.min.as_dvec3(), b.max.as_dvec3());
+            let found = oracle.classify(&b);
+            let wide = oracle.classify_f64(b.min.as_dvec3(), b.max.as_dvec3());
             assert_eq!(wide, found, "the same box, by other products");
             let name = || {
                 format!(

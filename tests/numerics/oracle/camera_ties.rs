@@ -133,7 +133,7 @@ fn whole_number_cameras_whose_ties_are_exact() {
                 (b.min, b.max) = (b.min + by, b.max + by);
             }
             let wanted = simplex::verdict(&planes, &b);
-            let found = oracle.judge(&b);
+            let found = oracle.classify(&b);
             // A tie of real numbers cannot be proved by any finite precision.
             assert!(
                 found.verdict == wanted && found.undecided == (wanted == Verdict::Touch),
@@ -161,7 +161,7 @@ fn lengths_far_beyond_f32_make_the_same_camera() {
         let off_axis = Lens::off_axis([-edge, edge, -edge, edge], near, None);
         let oracle = Oracle::of_camera(&pose, &off_axis.expect("a lens"), DVec3::ZERO);
         let oracle = oracle.expect("a camera");
-        let verdicts = [2.0, 2.0f32.next_up(), 1.5].map(|x| oracle.judge(&b(x)));
+        let verdicts = [2.0, 2.0f32.next_up(), 1.5].map(|x| oracle.classify(&b(x)));
         let wanted = [
             (Verdict::Touch, true),
             (Verdict::Out, false),
@@ -186,7 +186,7 @@ fn what_is_2_to_the_minus_100_beside_a_tie_is_decided() {
             up: DVec3::Y,
         };
         let oracle = Oracle::of_camera(&pose, &lens, DVec3::ZERO).expect("a camera");
-        let found = oracle.judge(&b);
+        let found = oracle.classify(&b);
         (found.verdict, found.undecided)
     };
     let near = libm::exp2(-100.0);

@@ -142,7 +142,7 @@ fn random_matrices_of_every_convention() {
             if !b.is_finite() || b.reach().max_element() > 1e37 {
                 continue;
             }
-            let found = oracle.judge(&b);
+            let found = oracle.classify(&b);
             let what = || format!("seed {seed}, {name}: {found:?} for {b:?}, {rows:?}");
             match robust(&planes, &b, -140) {
                 Some(wanted) => {
@@ -190,7 +190,7 @@ fn random_matrices_of_every_convention() {
 /// none of those may be lost; without the margin some are.
 #[test]
 fn points_on_the_planes_of_matrices_are_not_lost() {
-    let (mut visible, mut lost_bare) = (0, 0);
+    let (mut visible, mut lost) = (0, 0);
     for seed in 0..cases(3000) as u64 / 60 {
         let mut rng = SeededRng::new(seed ^ 0xFACE);
         let (convention, name, _) = MATRIX_CONVENTIONS[seed as usize % 8];
@@ -230,7 +230,7 @@ fn points_on_the_planes_of_matrices_are_not_lost() {
             ..PlaneOptions::default()
         };
         let bare = camera.volume(&bare, &around).expect("planes");
-        lost_bare += points.iter().filter(|b| !bare.sees(b)).count();
+        lost += points.iter().filter(|b| !bare.sees(b)).count();
         for made in safe_views_of(&camera, origin, &points) {
             for b in &points {
                 let kept = match made {
@@ -241,8 +241,8 @@ fn points_on_the_planes_of_matrices_are_not_lost() {
             }
         }
     }
-    assert!(visible > 500 && lost_bare > 50, "{visible}, {lost_bare}");
-    println!("points on planes of matrices: {visible} visible, {lost_bare} lost without a margin");
+    assert!(visible > 500 && lost > 50, "{visible}, {lost}");
+    println!("points on planes of matrices: {visible} visible, {lost} lost without a margin");
 }
 
 /// A left plane that leans by a component that is subnormal in f32.

@@ -43,7 +43,7 @@ impl Tally {
         let exact: Vec<simplex::ExactPlane> = planes.iter().map(simplex::exact).collect();
         for b in boxes {
             let wanted = simplex::verdict(&exact, b);
-            let found = oracle.judge(b);
+            let found = oracle.classify(b);
             assert!(
                 found.verdict == wanted && !found.undecided,
                 "{}: {found:?}, wanted {wanted:?}, for {b:?} and {planes:?}",

@@ -64,7 +64,7 @@ fn compare(vector: &Value, level: &str, oracle: &Oracle, failures: &mut Vec<Stri
             (true, true) => Verdict::Touch,
             (false, _) => Verdict::Out,
         };
-        let found = oracle.judge(&b);
+        let found = oracle.classify(&b);
         let undecided = level == "camera" && wanted == Verdict::Touch;
         if found.verdict != wanted || found.undecided != undecided {
             failures.push(format!(

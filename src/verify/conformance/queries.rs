@@ -27,7 +27,7 @@ pub(super) fn build_from<T: RegionIndex>(input: &Input) -> Result<T, String> {
 }
 
 /// Queries with the portable instruction set; `Break` if the sink broke off.
-pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
+pub(super) fn query<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
     index: &T,
     volume: &Q,
     sink: &mut S,
@@ -37,10 +37,10 @@ pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
 }
 
 /// Answer in the structure's own order.
-pub(super) fn seen<T: RegionIndex, Q: QueryVolume>(index: &T, volume: &Q) -> Vec<ItemId> {
+pub(super) fn ids_of<T: RegionIndex, Q: QueryVolume>(index: &T, volume: &Q) -> Vec<ItemId> {
     let mut ids = Vec::new();
     // A Vec never breaks off.
-    let _ = ask(index, volume, &mut ids, &mut NoRecorder);
+    let _ = query(index, volume, &mut ids, &mut NoRecorder);
     ids
 }
 
@@ -55,7 +55,7 @@ pub(super) fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome
 }
 
 /// A scene and the queries on it.
-pub(super) struct Questions {
+pub(super) struct QuerySet {
     pub(super) scene: String,
     pub(super) items: Vec<Aabb>,
     pub(super) volumes: Vec<ConvexVolume>,
@@ -66,31 +66,31 @@ pub(super) struct Questions {
 ///
 /// An error begins with the names of both.
 pub(super) fn each<T: RegionIndex>(
-    scenes: impl IntoIterator<Item = Questions>,
-    mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
+    scenes: impl IntoIterator<Item = QuerySet>,
+    mut holds: impl FnMut(&mut QuerySet, &mut T) -> Outcome,
 ) -> Outcome {
     each_of(&mut scenes.into_iter(), &mut holds)
 }
 
 /// Compiled once per structure, not once per property.
 fn each_of<T: RegionIndex>(
-    scenes: &mut dyn Iterator<Item = Questions>,
-    holds: &mut dyn FnMut(&mut Questions, &mut T) -> Outcome,
+    scenes: &mut dyn Iterator<Item = QuerySet>,
+    holds: &mut dyn FnMut(&mut QuerySet, &mut T) -> Outcome,
 ) -> Outcome {
-    for mut questions in scenes {
+    for mut queries in scenes {
         let outcome = caught(|| {
-            let mut index = build(&questions.items)?;
-            holds(&mut questions, &mut index)
+            let mut index = build(&queries.items)?;
+            holds(&mut queries, &mut index)
         });
         let outcome = outcome.unwrap_or_else(|message| Err(format!("panicked: {message}")));
-        outcome.map_err(|why| format!("{} on '{}': {why}", T::INFO.name, questions.scene))?;
+        outcome.map_err(|why| format!("{} on '{}': {why}", T::INFO.name, queries.scene))?;
     }
     Ok(())
 }
 
 /// The [`edge_scenes`] with their volumes.
-pub(super) fn edges() -> impl Iterator<Item = Questions> {
-    edge_scenes().into_iter().map(|(scene, items)| Questions {
+pub(super) fn edges() -> impl Iterator<Item = QuerySet> {
+    edge_scenes().into_iter().map(|(scene, items)| QuerySet {
         scene: scene.to_owned(),
         volumes: edge_volumes(&items),
         points: points(&items),
@@ -101,12 +101,12 @@ pub(super) fn edges() -> impl Iterator<Item = Questions> {
 /// The [`RandomCase`]s of some seeds, with derived volumes.
 ///
 /// The last point is the case's own.
-pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
+pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = QuerySet> {
     seeds.map(|seed| {
         let (case, next) = (RandomCase::new(seed), RandomCase::new(seed + 1));
         let mut volumes = derived(&case.volume, &next.volume, &case.items);
         volumes.insert(0, case.volume);
-        Questions {
+        QuerySet {
             scene: format!("random case {seed}"),
             volumes,
             points: [points(&case.items), vec![case.point]].concat(),
@@ -131,7 +131,7 @@ fn derived(volume: &ConvexVolume, other: &ConvexVolume, items: &[Aabb]) -> Vec<C
         .collect()
 }
 
-impl Questions {
+impl QuerySet {
     pub(super) fn visible_is_right<T: RegionIndex>(&self, index: &T) -> Outcome {
         self.volumes.iter().enumerate().try_for_each(|(i, volume)| {
             let why = |b: &Aabb| explain_visibility(b, volume);
@@ -153,8 +153,8 @@ impl Questions {
 
     /// All answers in the structure's own order: equal for equal structures.
     pub(super) fn answers<T: RegionIndex>(&self, index: &T) -> Vec<Vec<ItemId>> {
-        let visible = self.volumes.iter().map(|volume| seen(index, volume));
-        let holding = self.points.iter().map(|p| seen(index, p));
+        let visible = self.volumes.iter().map(|volume| ids_of(index, volume));
+        let holding = self.points.iter().map(|p| ids_of(index, p));
         visible.chain(holding).collect()
     }
 }
@@ -172,8 +172,8 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
     explain: impl Fn(&Aabb) -> String,
 ) -> Outcome {
     let mut trial = Trial::new(items.len());
-    trial.expect(scan(items, |b| volume.sees(b)));
-    let answer = trial.ask(|ids| *ids = seen(index, volume));
+    trial.set_expected(scan(items, |b| volume.sees(b)));
+    let answer = trial.run(|ids| *ids = ids_of(index, volume));
     let why = |id: usize| Some(explain(items.get(id)?));
     let plain = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
     let best = index.visible(volume);
@@ -183,7 +183,7 @@ pub(super) fn is_right<T: RegionIndex, Q: QueryVolume>(
         format!("{kind}: {best} ids by {kernel}, other {plain} by portable")
     })?;
     let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
-    let _ = ask(index, volume, &mut ids, &mut cost);
+    let _ = query(index, volume, &mut ids, &mut cost);
     let planes = Q::planes_open(volume.mask());
     let looked_at = cost.items_tested + cost.items_accepted_untested;
     let most = cost.comparisons() * u64::from(planes);
@@ -214,12 +214,12 @@ pub(super) fn points(items: &[Aabb]) -> Vec<Vec3> {
 }
 
 /// Generated worlds with cameras around and inside them.
-pub(super) fn generated_scenes(n: usize) -> Result<Vec<Questions>, String> {
+pub(super) fn generated_scenes(n: usize) -> Result<Vec<QuerySet>, String> {
     let load = |family: &scene::Family| {
         let source = format!("{}:n={n},seed=5", family.name);
         let scene = scene::load(&source, &scene::LoadOptions::default())
             .map_err(|error| format!("{source}: {error}"))?;
-        Ok(Questions {
+        Ok(QuerySet {
             volumes: camera_volumes(&scene).map_err(|error| format!("{source}: {error}"))?,
             points: points(&scene.items),
             scene: source,
