@@ -9,7 +9,7 @@ use cullbench::kernel::Kernel;
 use cullbench::measure::{Stopwatch, Workload, trimmed_mean};
 use cullbench::query::AnyVolume;
 use cullbench::visibility::occlusion::{
-    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View,
+    Interleaved, MaskedCentre, MaskedInner, OccluderTree, OcclusionBuffer, View,
 };
 use cullbench::visibility::{Rays, SampleGrid, Solids};
 
@@ -59,7 +59,7 @@ fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
     let kernel = Kernel::best();
     let (typed, scene, cameras) = loaded(source, PATH, only_test);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
-    let occluders = OccluderScene::of(&Solids::of(&scene));
+    let occluders = OccluderTree::of(&Solids::of(&scene));
     let views = cameras.cameras.iter().zip(&workload.views);
     let views = views.map(|(camera, view)| {
         let AnyVolume::Planes(volume) = view.as_any() else {

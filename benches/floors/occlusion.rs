@@ -8,7 +8,7 @@ use cullbench::kernel::{Isa, Kernel, LaneMask, Work};
 use cullbench::measure::{Stopwatch, Workload, trimmed_mean};
 use cullbench::query::AnyVolume;
 use cullbench::visibility::occlusion::{
-    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, Rects, View,
+    Interleaved, MaskedInner, OccluderTree, OcclusionBuffer, Rects, View,
 };
 use cullbench::visibility::{Rays, SampleGrid, Solids};
 
@@ -25,7 +25,7 @@ const LEAST_TIMES: f64 = 2.5;
 // No closures within `run`: they would be compiled for the portable set.
 
 /// The rectangles of all boxes.
-struct Project<'a>(&'a OccluderScene, &'a View<'a>);
+struct Project<'a>(&'a OccluderTree, &'a View<'a>);
 
 impl Work for Project<'_> {
     type Output = LaneMask;
@@ -83,7 +83,7 @@ impl Work for Alone<'_> {
 
 /// Collects the rectangles of all boxes in view, block by block.
 struct Ask<'a>(
-    &'a OccluderScene,
+    &'a OccluderTree,
     &'a View<'a>,
     &'a mut Vec<(Rects, LaneMask)>,
 );
@@ -115,7 +115,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
 fn missed_by(kernel: Kernel, only_test: bool, turns: usize) -> u32 {
     let (source, scene, cameras) = loaded(SCENE, PATH, only_test);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
-    let occluders = OccluderScene::of(&Solids::of(&scene));
+    let occluders = OccluderTree::of(&Solids::of(&scene));
     let mut views = Vec::new();
     for (camera, view) in cameras.cameras.iter().zip(&workload.views) {
         let AnyVolume::Planes(volume) = view.as_any() else {

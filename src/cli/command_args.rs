@@ -12,7 +12,7 @@ use crate::report::JUDGED_METRICS;
 use crate::spec::{SpecError, values};
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
-use crate::visibility::inscribed::MOST_BOXES;
+use crate::visibility::inner_boxes::MOST_BOXES;
 
 #[derive(Args, Debug)]
 #[command(after_help = program::named(include_str!("assets/help/view.txt")))]

@@ -6,7 +6,7 @@ use super::document::{Block, Column, Table};
 use super::text::{self, shortened, some};
 use crate::funnel::{FunnelReport, Gain, NONE, PickRow, StageKind, StageRow};
 use crate::visibility::Guarantee;
-use crate::visibility::fragment::Tally;
+use crate::visibility::fragment::FragmentCounts;
 
 /// The chain and its gain; with `all` every other back end too.
 pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
@@ -189,7 +189,7 @@ pub fn count(mean: f64) -> String {
 
 /// The tests of the fragment stage, if there are several to compare.
 fn fragments(report: &FunnelReport) -> Table {
-    let columns: &[Column<(&'static str, Tally<f64>)>] = &[
+    let columns: &[Column<(&'static str, FragmentCounts<f64>)>] = &[
         ("test", |(name, _)| (*name).to_owned()),
         (">samples tested", |(_, of)| count(of.asked_count)),
         (">kept out", |(_, of)| count(of.kept_out_count)),

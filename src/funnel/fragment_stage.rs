@@ -18,24 +18,24 @@ use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
 use crate::visibility::Rays;
-use crate::visibility::fragment::{Canvas, Drawn, Holes, Screen, Tally, Tests};
+use crate::visibility::fragment::{AlphaMasks, Canvas, Drawn, FragmentCounts, Screen, Tests};
 use crate::visibility::truth::{Facet, SolidBox};
 
 /// Samples and fragments of a test, as means per view.
-pub type FragmentCounts = Tally<f64>;
+pub type MeanCounts = FragmentCounts<f64>;
 
-impl FragmentCounts {
-    /// Means of the tallies of all views; `None` without views.
-    pub(super) fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
-        let views = tallies.len() as f64;
-        let mean = |of: fn(&Tally) -> u64| tallies.iter().map(of).sum::<u64>() as f64 / views;
-        (!tallies.is_empty()).then(|| FragmentCounts {
-            asked_count: mean(|tally| tally.asked_count),
-            kept_out_count: mean(|tally| tally.kept_out_count),
-            fragment_count: mean(|tally| tally.fragment_count),
-            clear_count: mean(|tally| tally.clear_count),
-            shaded_count: mean(|tally| tally.shaded_count),
-            covered_count: mean(|tally| tally.covered_count),
+impl MeanCounts {
+    /// Means of the counts of all views; `None` without views.
+    pub(super) fn of(all: &[FragmentCounts]) -> Option<MeanCounts> {
+        let views = all.len() as f64;
+        let mean = |of: fn(&FragmentCounts) -> u64| all.iter().map(of).sum::<u64>() as f64 / views;
+        (!all.is_empty()).then(|| MeanCounts {
+            asked_count: mean(|counts| counts.asked_count),
+            kept_out_count: mean(|counts| counts.kept_out_count),
+            fragment_count: mean(|counts| counts.fragment_count),
+            clear_count: mean(|counts| counts.clear_count),
+            shaded_count: mean(|counts| counts.shaded_count),
+            covered_count: mean(|counts| counts.covered_count),
         })
     }
 }
@@ -79,7 +79,7 @@ impl Geometry<'_> {
 }
 
 /// A test, its errors, and the counts of each drawn view.
-type TestResult = (BackEnd, Errors, Vec<Tally>);
+type TestResult = (BackEnd, Errors, Vec<FragmentCounts>);
 
 impl<'w> FragmentStage<'w> {
     /// Collects the remaining items, with triangles culled by the back end `triangle`.
@@ -116,7 +116,7 @@ impl<'w> FragmentStage<'w> {
     }
 
     /// Draws a view with a test; appends the items in front at any sample.
-    fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> Tally {
+    fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> FragmentCounts {
         let (rays, grid) = (self.setup.rays(view), self.setup.samples);
         match &self.geometry {
             Geometry::Boxes(views, image) => {
@@ -126,11 +126,11 @@ impl<'w> FragmentStage<'w> {
                 };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.turn_to(rays);
+                canvas.set_camera(rays);
                 let surfaces = self.setup.cut_outs.as_ref().filter(|_| test != Z);
                 views[view].draw(test, surfaces, canvas, drawn);
                 out.extend(drawn.visible(canvas));
-                drawn.tally
+                drawn.counts
             }
             Geometry::Triangles(surfaces, views, image) => {
                 let new = || {
@@ -139,13 +139,13 @@ impl<'w> FragmentStage<'w> {
                 };
                 let image = &mut *image.borrow_mut();
                 let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.turn_to(rays);
+                canvas.set_camera(rays);
                 drawn.draw_triangles(canvas, surfaces, &views[view]);
                 // Floors and ceilings of a map follow its items.
                 let items = self.setup.items() as ItemId;
                 let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.filter(|item| *item < items));
-                drawn.tally
+                drawn.counts
             }
         }
     }
@@ -175,21 +175,21 @@ impl<'w> FragmentStage<'w> {
         })
     }
 
-    /// Applies `none` and each test to the remaining items; tallies of drawn views.
+    /// Applies `none` and each test to the remaining items; counts of drawn views.
     pub fn tested(&self, stages: &ItemStages, truth: &VisibleItems) -> Vec<TestResult> {
         let setup = self.setup;
         let tested = self.tests().map(|back_end| {
-            let (mut counts, mut tallies) = (Vec::new(), Vec::new());
+            let (mut counts, mut drawn) = (Vec::new(), Vec::new());
             for view in setup.views() {
                 let given = stages.remaining(view);
                 let mut output = Vec::new();
                 match back_end.name {
                     NONE => output.extend_from_slice(&setup.listed(given)),
-                    test => tallies.push(self.draw(test, view, &mut output)),
+                    test => drawn.push(self.draw(test, view, &mut output)),
                 }
                 counts.push(count_items(given, setup.items(), &output, &truth[view]));
             }
-            (back_end, Errors::of(&counts), tallies)
+            (back_end, Errors::of(&counts), drawn)
         });
         tested.collect()
     }
@@ -212,7 +212,7 @@ struct PortalPass {
 
 impl BoxView {
     /// Redraws the image with a test; `surfaces` may have holes.
-    fn draw(&self, test: &str, surfaces: Option<&Holes>, canvas: &Canvas, drawn: &mut Drawn) {
+    fn draw(&self, test: &str, surfaces: Option<&AlphaMasks>, canvas: &Canvas, drawn: &mut Drawn) {
         drawn.clear();
         let tests = Tests {
             surfaces,
@@ -224,7 +224,7 @@ impl BoxView {
                 drawn.draw(canvas, pass.near.iter().copied(), &tests);
                 // Samples whose ray reaches a portal before everything drawn so far.
                 let stencil = drawn.stencil(canvas, &pass.portals);
-                drawn.tally.asked_count += stencil.tested;
+                drawn.counts.asked_count += stencil.tested;
                 let stencil = Some(&stencil);
                 let beyond = pass.beyond.iter().copied();
                 drawn.draw(canvas, beyond, &Tests { stencil, ..tests });

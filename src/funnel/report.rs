@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::error::LeftOutRow;
-use super::fragment_stage::FragmentCounts;
+use super::fragment_stage::MeanCounts;
 use super::item_stages::PlanView;
 use super::picks::PickRow;
 use super::stage::{BackEnd, Chain, NONE, STENCIL, StageKind, default_test};
@@ -14,7 +14,7 @@ use crate::shown::{counted, significant, time};
 use crate::statistics::{ALPHA, Estimate, centre, flat, ratio, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::CutOuts;
-use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
+use crate::visibility::occluders::{BlockStats, GroundStats, InnerBoxStats};
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
@@ -44,11 +44,11 @@ pub struct FunnelReport {
     /// Every back end of every stage.
     pub stages: Vec<StageRow>,
     /// Occluder boxes inside the items of a mesh; null for other scenes.
-    pub inner_boxes: Option<InnerRow>,
+    pub inner_boxes: Option<InnerBoxStats>,
     /// Occluder boxes in the solid space of a map; null for other scenes.
-    pub solid_blocks: Option<BlocksRow>,
+    pub solid_blocks: Option<BlockStats>,
     /// Occluder boxes below the ground of a mesh; null for a scene without ground.
-    pub ground: Option<GroundRow>,
+    pub ground: Option<GroundStats>,
     /// Results of picking, by back end and structure.
     pub picks: Vec<PickRow>,
     /// Missing rows, each with its reason.
@@ -107,7 +107,7 @@ pub struct StageRow {
     /// Time / candidates.
     pub ns_per_decided: Option<f64>,
     /// Samples and fragments of a fragment test; null for other stages.
-    pub fragments: Option<FragmentCounts>,
+    pub fragments: Option<MeanCounts>,
 }
 
 impl StageRow {

@@ -18,9 +18,9 @@ use crate::query::ItemId;
 use crate::scene::{self, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
 use crate::shown::{counted, significant};
 use crate::visibility::fragment::{self, CutOuts};
-use crate::visibility::hiders::Hiders;
-use crate::visibility::inscribed::BOXES;
-use crate::visibility::occlusion::OccluderScene;
+use crate::visibility::inner_boxes::BOXES;
+use crate::visibility::occluders::SceneOccluders;
+use crate::visibility::occlusion::OccluderTree;
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{Pvs, RegionGraph, RegionItems};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, surfaces_of};
@@ -129,9 +129,9 @@ pub struct Setup<'a> {
     pub views: Vec<PathView>,
     pub shape: Shape,
     /// Items that have holes, if any.
-    pub cut_outs: Option<fragment::Holes>,
+    pub cut_outs: Option<fragment::AlphaMasks>,
     /// Occluders of the scene.
-    pub hiders: Hiders,
+    pub occluders: SceneOccluders,
     pub regions: Option<Regions>,
     /// Structures of the object stage with their specs.
     pub structures: Vec<(&'a StructureSpec, Box<dyn DynIndex>)>,
@@ -166,18 +166,18 @@ impl<'a> Setup<'a> {
             // The next room is visible through portals only, so walls have no holes.
             let walls = regions.as_ref().map(|regions| regions.graph.borders(scene));
             let is_free = |item| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
-            let holes = typed.holes(scene.items.len(), is_free);
+            let masks = typed.masks(scene.items.len(), is_free);
             // An item with holes may be hidden but hides nothing.
-            let all = solids.inner.iter_mut().zip(&holes.of_item);
+            let all = solids.inner.iter_mut().zip(&masks.of_item);
             for (inner, _) in all.filter(|(_, hole)| hole.is_some()) {
                 *inner = Aabb::EMPTY;
             }
-            cut_outs = Some(holes);
+            cut_outs = Some(masks);
         }
         begin("occluders");
         let most = input.inner_boxes.unwrap_or(BOXES);
         Ok(Setup {
-            hiders: Hiders::of(scene, shape.boxes(), most, input.execution.threads),
+            occluders: SceneOccluders::of(scene, shape.boxes(), most, input.execution.threads),
             scene,
             kernel: input.execution.kernel,
             samples: input.samples,
@@ -213,13 +213,14 @@ impl<'a> Setup<'a> {
     }
 
     /// Occluders valid for a view.
-    pub fn occluders(&self, view: usize) -> &OccluderScene {
+    pub fn occluders(&self, view: usize) -> &OccluderTree {
         let rays = self.rays(view);
         let is_inside = || {
             let regions = self.regions.as_ref();
             regions.is_some_and(|regions| regions.graph.homes(rays, &mut Vec::new()))
         };
-        self.hiders.from_eye(self.hiders.is_open(rays, is_inside))
+        self.occluders
+            .from_eye(self.occluders.is_open(rays, is_inside))
     }
 
     /// Warning about items in view that f32 moves by much of their longest edge.

@@ -9,7 +9,7 @@ use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
 use crate::shown::{count, counted};
 use crate::visibility::occlusion::{
-    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View,
+    Interleaved, MaskedCentre, MaskedInner, OccluderTree, OcclusionBuffer, View,
 };
 use crate::visibility::triangle::TRIANGLE_ROWS;
 use crate::visibility::{Guarantee, Row, SampleGrid, region};
@@ -252,7 +252,7 @@ pub fn default_test(has_cut_outs: bool) -> &'static str {
 }
 
 /// Appends the items of a view that are not hidden.
-pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &mut Vec<ItemId>)>;
+pub type Occlude = Box<dyn FnMut(&OccluderTree, &View, &mut Vec<ItemId>)>;
 
 /// Row of the occlusion stage: allocates a buffer of the given size.
 pub type OcclusionRow = Row<fn(SampleGrid, Kernel) -> Occlude>;

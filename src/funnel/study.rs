@@ -5,7 +5,7 @@
 use anyhow::Result;
 
 use super::error::{LeftOutRow, check_memory};
-use super::fragment_stage::{FragmentCounts, FragmentStage};
+use super::fragment_stage::{FragmentStage, MeanCounts};
 use super::item_stages::{ItemStages, PlanView};
 use super::picks::Picks;
 use super::report::{CutOutRow, FunnelReport, Gain, StageRow, conclusions};
@@ -167,9 +167,9 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunne
     begin("every stage, compared with the truth");
     let study = Study::new(&setup, input)?;
     let mut rows = study.rows(&truth);
-    for (back_end, errors, tallies) in study.fragments.tested(&study.items, &truth) {
+    for (back_end, errors, counts) in study.fragments.tested(&study.items, &truth) {
         rows.push(StageRow {
-            fragments: FragmentCounts::of(&tallies),
+            fragments: MeanCounts::of(&counts),
             ..StageRow::new(back_end, back_end.name, &input.chain, errors)
         });
     }
@@ -187,7 +187,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunne
         left_out.push(LeftOutRow::new("picks", "all", reason));
     }
     let cut_outs = input.cut_outs.zip(setup.cut_outs.as_ref());
-    let ground = setup.hiders.ground.as_ref();
+    let ground = setup.occluders.ground.as_ref();
     let report = FunnelReport {
         scene: scene.name.clone(),
         path: path.name.clone(),
@@ -205,9 +205,9 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunne
         chain: input.chain.clone(),
         gains: study.gains(&rows),
         stages: rows,
-        inner_boxes: setup.hiders.inner.clone(),
+        inner_boxes: setup.occluders.inner.clone(),
         ground: ground.map(|ground| ground.row.clone()),
-        solid_blocks: setup.hiders.blocks.clone(),
+        solid_blocks: setup.occluders.blocks.clone(),
         picks,
         left_out,
         conclusions: Vec::new(),

@@ -45,15 +45,15 @@ pub fn visible(setup: &Setup, threads: usize) -> anyhow::Result<VisibleItems> {
 
 /// Surfaces that stop rays: solid boxes, or triangles with the floors of a map.
 pub enum RayTargets<'w> {
-    Boxes(RayIndex, Option<&'w fragment::Holes>),
+    Boxes(RayIndex, Option<&'w fragment::AlphaMasks>),
     Triangles(SurfaceIndex),
 }
 
 impl RayTargets<'_> {
     /// Surfaces of a scene of this shape, with the holes of its items.
-    pub fn of<'w>(shape: &Shape, holes: Option<&'w fragment::Holes>) -> RayTargets<'w> {
+    pub fn of<'w>(shape: &Shape, masks: Option<&'w fragment::AlphaMasks>) -> RayTargets<'w> {
         match shape {
-            Shape::Boxes(solids) => RayTargets::Boxes(RayIndex::build(solids), holes),
+            Shape::Boxes(solids) => RayTargets::Boxes(RayIndex::build(solids), masks),
             Shape::Triangles(surfaces) => RayTargets::Triangles(SurfaceIndex::build(surfaces)),
         }
     }
@@ -69,8 +69,8 @@ impl RayTargets<'_> {
         threads: usize,
     ) -> Result<SampleTruth, String> {
         let coarse_tests = match self {
-            RayTargets::Boxes(index, _) => index.tests(rays, COARSE_GRID),
-            RayTargets::Triangles(index) => index.tests(rays, COARSE_GRID),
+            RayTargets::Boxes(index, _) => index.min_body_tests(rays, COARSE_GRID),
+            RayTargets::Triangles(index) => index.min_body_tests(rays, COARSE_GRID),
         };
         let most = most_drawn(samples);
         let most_tests = most * TESTS_PER_ITEM;
@@ -86,9 +86,9 @@ impl RayTargets<'_> {
             return Err(refused(&found, most_tests, "around the eye"));
         }
         let truth = match self {
-            RayTargets::Boxes(index, holes) => {
+            RayTargets::Boxes(index, masks) => {
                 let opaque = |body: &SolidBox, probe: &_, at: &_| {
-                    holes.is_none_or(|holes| holes.opaque(body.item, &body.b, probe, at))
+                    masks.is_none_or(|masks| masks.opaque(body.item, &body.b, probe, at))
                 };
                 SampleTruth::of_opaque(index, &opaque, rays, samples, threads, most)
             }

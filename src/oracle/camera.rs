@@ -64,19 +64,19 @@ impl Oracle {
         let back = unit(&forward).map(|c| -&c);
         let v = cross(&back, &u);
         let eye = exact::difference(eye, origin);
-        let constraints = planes(&View { u, v, back, eye }, lens);
+        let constraints = planes(&CameraAxes { u, v, back, eye }, lens);
         Some(Oracle::new(constraints, PRECISION))
     }
 }
 
-struct View {
+struct CameraAxes {
     u: ExactVector,
     v: ExactVector,
     back: ExactVector,
     eye: ExactVector,
 }
 
-impl View {
+impl CameraAxes {
     /// Half-space of the points x with `normal . (x - eye) + offset >= 0`.
     fn half_space(&self, normal: &ExactVector, offset: &Expansion) -> HalfSpace {
         let p = PRECISION;
@@ -97,7 +97,7 @@ impl View {
     }
 }
 
-fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
+fn planes(view: &CameraAxes, lens: &Lens) -> Vec<HalfSpace> {
     let number = |x: f64| Expansion::from(x);
     let mut planes = Vec::with_capacity(6);
     // Left, right, bottom and top edges of the window, and its depth.

@@ -5,9 +5,9 @@
 //! `truth`. Nothing here is timed or printed.
 
 pub mod fragment;
-pub mod hiders;
-pub mod inscribed;
+pub mod inner_boxes;
 mod level;
+pub mod occluders;
 pub mod occlusion;
 pub mod pick;
 mod rays;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cullbench::visibility::inscribed::BOXES;
+use cullbench::visibility::inner_boxes::BOXES;
 use serde_json::Value;
 
 use super::FULL_CAMERA;

@@ -2,7 +2,7 @@
 
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene, SeededRng, WorldBox};
-use cullbench::visibility::pick::{Linear, Pick};
+use cullbench::visibility::pick::{LinearScan, Pick};
 use cullbench::visibility::truth::{Boxes, Facets};
 use cullbench::visibility::{Ray, Solids};
 use glam::DVec3;
@@ -14,7 +14,7 @@ fn back_ends_pick_what_the_reference_picks() {
     let boxes = (0..300).map(&mut random).collect::<Vec<_>>();
     let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
     let boxes = Boxes::of(&solids);
-    let reference = Linear(boxes.clone());
+    let reference = LinearScan(boxes.clone());
     for row in Boxes::BACK_ENDS {
         let back_end = (row.build)(&boxes, Kernel::best());
         let (mut hits, mut truth) = (Vec::new(), Vec::new());

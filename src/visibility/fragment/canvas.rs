@@ -30,22 +30,22 @@ impl Rectangle {
 /// Let u = 2^-53 and D the sum of the absolute components of `corner - eye`. The difference is
 /// accurate to u D and each dot product to 4 u D, so a slope `s = x / w` is accurate to 9 u (1 +
 /// |s|) D / w. The constant is 512 u.
-const ROUNDED: f64 = 1.0 / (1u64 << 44) as f64;
+const SLOPE_PAD: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Widening where an edge is clipped at the near plane, relative to D.
 ///
-/// The edge's ends differ in depth by at least [`LEVEL`] D, so the clip point is accurate to 2^20 *
+/// The edge's ends differ in depth by at least [`MIN_CLIP_DEPTH`] D, so the clip point is accurate to 2^20 *
 /// 16 u D. The constant is twice that.
-const CUT: f64 = 1.0 / (1u64 << 28) as f64;
+const CLIP_PAD: f64 = 1.0 / (1u64 << 28) as f64;
 
 /// Least depth difference of a clipped edge, relative to D.
 ///
 /// An edge that crosses the near plane with a smaller difference is not clipped: its body gets the
 /// whole image.
-const LEVEL: f64 = 1.0 / (1u64 << 20) as f64;
+const MIN_CLIP_DEPTH: f64 = 1.0 / (1u64 << 20) as f64;
 
 /// Upper bound of the rounding errors of a camera's rays and axes, as slopes.
-const AXES: f64 = 1e-12;
+const AXIS_PAD: f64 = 1e-12;
 
 /// A camera's image plane, onto which bodies are projected.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ impl Screen {
         let mut corners = [[0.0; 4]; 8];
         for (i, corner) in corners.iter_mut().enumerate() {
             let pick = |k: usize| if i >> k & 1 == 1 { b.max[k] } else { b.min[k] };
-            *corner = self.place(DVec3::new(pick(0), pick(1), pick(2)) - self.eye, 0.0);
+            *corner = self.project(DVec3::new(pick(0), pick(1), pick(2)) - self.eye, 0.0);
         }
         self.hull(&corners, |from, to| (from ^ to).is_power_of_two())
     }
@@ -104,7 +104,7 @@ impl Screen {
             let corner = corner.as_dvec3();
             // The shift and the sum round once each.
             let off = 2.0 * f64::EPSILON * (corner.abs() + shift.abs()).element_sum();
-            *placed = self.place(corner + shift, off);
+            *placed = self.project(corner + shift, off);
         }
         self.hull(&placed, |from, to| from != to)
     }
@@ -113,10 +113,10 @@ impl Screen {
     ///
     /// Errors are relative to `size`. The point itself may be wrong by `off`.
     #[inline]
-    fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
+    fn project(&self, at: DVec3, off: f64) -> [f64; 4] {
         let [x, y, w] = each(self.axes, |axis| at.dot(axis));
         // `off` is an error of the depth as well.
-        let size = at.abs().element_sum() + (off + self.off) / ROUNDED;
+        let size = at.abs().element_sum() + (off + self.off) / SLOPE_PAD;
         [x, y, w, size]
     }
 
@@ -129,46 +129,47 @@ impl Screen {
         is_edge: impl Fn(usize, usize) -> bool,
     ) -> Option<Rectangle> {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let mut add = |place: [f64; 2], pad: f64| {
-            for (axis, at) in place.into_iter().enumerate() {
+        let mut add = |project: [f64; 2], pad: f64| {
+            for (axis, at) in project.into_iter().enumerate() {
                 let pad = pad * (1.0 + at.abs());
                 low[axis] = low[axis].min(at - pad);
                 high[axis] = high[axis].max(at + pad);
             }
         };
-        let least = corners.iter().map(|c| c[2] - c[3] * ROUNDED);
+        let least = corners.iter().map(|c| c[2] - c[3] * SLOPE_PAD);
         if least.fold(f64::INFINITY, f64::min) > self.far {
             return None;
         }
         if self.parallel {
             corners
                 .iter()
-                .for_each(|&[x, y, _, size]| add([x, y], size * ROUNDED + AXES));
+                .for_each(|&[x, y, _, size]| add([x, y], size * SLOPE_PAD + AXIS_PAD));
             return self.cells(low, high);
         }
-        if corners.iter().all(|c| c[2] + c[3] * ROUNDED < self.near) {
+        if corners.iter().all(|c| c[2] + c[3] * SLOPE_PAD < self.near) {
             return None;
         }
         for (i, &[x, y, w, size]) in corners.iter().enumerate() {
             if w >= self.near {
-                add([x / w, y / w], size / w * ROUNDED + AXES);
+                add([x / w, y / w], size / w * SLOPE_PAD + AXIS_PAD);
                 continue;
             }
             // Rounding hides on which side of the near plane the corner lies.
-            if w + size * ROUNDED >= self.near {
+            if w + size * SLOPE_PAD >= self.near {
                 return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
             }
             for (to, &[to_x, to_y, to_w, to_size]) in corners.iter().enumerate() {
                 let size = size.max(to_size);
-                if !is_edge(i, to) || to_w + size * ROUNDED < self.near {
+                if !is_edge(i, to) || to_w + size * SLOPE_PAD < self.near {
                     continue;
                 }
-                if to_w - w < size * LEVEL {
+                if to_w - w < size * MIN_CLIP_DEPTH {
                     return self.cells([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
                 }
                 let part = (self.near - w) / (to_w - w);
                 let at = |a: f64, b: f64| (a + (b - a) * part) / self.near;
-                add([at(x, to_x), at(y, to_y)], size / self.near * CUT + AXES);
+                let pad = size / self.near * CLIP_PAD + AXIS_PAD;
+                add([at(x, to_x), at(y, to_y)], pad);
             }
         }
         self.cells(low, high)
@@ -222,12 +223,12 @@ impl<B: Body> Canvas<B> {
             origin,
             probes: Vec::with_capacity(grid.samples()),
         };
-        canvas.turn_to(rays);
+        canvas.set_camera(rays);
         canvas
     }
 
     /// Replaces the rays by those of another camera, in the same memory.
-    pub fn turn_to(&mut self, rays: &Rays) {
+    pub fn set_camera(&mut self, rays: &Rays) {
         let grid = self.screen.grid;
         self.screen = Screen::of(rays, grid);
         self.probes.clear();

@@ -44,7 +44,7 @@ impl Mask {
 
 /// A mask and the size of its tiles.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Surface {
+pub struct TiledMask {
     /// Pattern of its opaque parts.
     pub mask: Mask,
     /// Edge length of a tile, world units; above 0.
@@ -53,27 +53,27 @@ pub struct Surface {
 
 /// The cut-outs among the items of a scene; all other items are solid.
 #[derive(Clone, Default, Debug)]
-pub struct Holes {
+pub struct AlphaMasks {
     /// Surface of each item; the items beyond its end are solid.
-    pub of_item: Vec<Option<Surface>>,
+    pub of_item: Vec<Option<TiledMask>>,
 }
 
-impl Holes {
+impl AlphaMasks {
     /// Tests whether an item is opaque where a ray enters its box.
     ///
     /// The position on the face is computed at the rounded depth, relative to the box's lower
     /// corner, along the face's two axes in the order x, y, z.
     pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
-        let Some(Some(surface)) = self.of_item.get(item as usize) else {
+        let Some(Some(tiled)) = self.of_item.get(item as usize) else {
             return true;
         };
-        let place = (probe.ray.at(at.depth) - b.min) / surface.tile;
+        let place = (probe.ray.at(at.depth) - b.min) / tiled.tile;
         let [u, v] = match at.axis {
             0 => [place.y, place.z],
             1 => [place.x, place.z],
             _ => [place.x, place.y],
         };
-        surface.mask.opaque(u, v)
+        tiled.mask.opaque(u, v)
     }
 }
 
@@ -118,13 +118,13 @@ impl CutOuts {
     /// Chooses cut-outs at random among the `items` that satisfy `may_be`.
     ///
     /// The choice does not depend on the mask.
-    pub fn holes(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> Holes {
+    pub fn masks(&self, items: usize, may_be: impl Fn(ItemId) -> bool) -> AlphaMasks {
         let mut rng = SeededRng::new(self.seed);
         let CutOuts { mask, tile, .. } = *self;
         let mut is_cut = |item| rng.unit() < self.share && may_be(item);
-        let surface = |item| is_cut(item).then_some(Surface { mask, tile });
-        let of_item = (0..items as ItemId).map(surface).collect();
-        Holes { of_item }
+        let tiled = |item| is_cut(item).then_some(TiledMask { mask, tile });
+        let of_item = (0..items as ItemId).map(tiled).collect();
+        AlphaMasks { of_item }
     }
 }
 
@@ -164,12 +164,12 @@ mod tests {
         });
         let at = probe.enter(&b, f64::INFINITY).unwrap();
         assert_eq!(at.axis, 0);
-        let mut surfaces = Holes {
+        let mut surfaces = AlphaMasks {
             of_item: vec![None; 4],
         };
         let mut opaque = |tile: f64| {
             let mask = Mask::Fence;
-            surfaces.of_item[3] = Some(Surface { mask, tile });
+            surfaces.of_item[3] = Some(TiledMask { mask, tile });
             surfaces.opaque(3, &b, &probe, &at)
         };
         // The ray enters at y = 1, z = 0: (2, 1) from the corner.
@@ -183,20 +183,20 @@ mod tests {
     fn what_is_typed_is_what_is_cut_out() {
         let typed = CutOuts::parse("foliage:share=50%,tile=2,seed=7").unwrap();
         assert_eq!((typed.mask, typed.share), (Mask::Foliage, 0.5));
-        let surfaces = typed.holes(1000, |item| item % 2 == 0);
+        let surfaces = typed.masks(1000, |item| item % 2 == 0);
         let cut: Vec<ItemId> = (0..1000)
             .filter(|i| surfaces.of_item[*i as usize].is_some())
             .collect();
         assert!(cut.iter().all(|item| item % 2 == 0));
         assert!((200..300).contains(&cut.len()), "{}", cut.len());
-        let tile = surfaces.of_item[cut[0] as usize].map(|surface| surface.tile);
+        let tile = surfaces.of_item[cut[0] as usize].map(|mask| mask.tile);
         assert_eq!(tile, Some(2.0));
         let fence = CutOuts::parse("fence").unwrap();
         assert_eq!((fence.share, fence.tile, fence.seed), (0.2, 1.0, 1));
         let whole = CutOuts::parse("fence:share=1").unwrap();
-        let all = whole.holes(50, |_| true);
+        let all = whole.masks(50, |_| true);
         assert!((0..50).all(|item| all.of_item[item].is_some()));
-        let other = CutOuts { seed: 8, ..typed }.holes(1000, |item| item % 2 == 0);
+        let other = CutOuts { seed: 8, ..typed }.masks(1000, |item| item % 2 == 0);
         assert!(
             (0..1000).any(|item| other.of_item[item].is_some() != surfaces.of_item[item].is_some())
         );

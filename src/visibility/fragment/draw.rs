@@ -5,7 +5,7 @@
 use serde::Serialize;
 
 use super::canvas::{Canvas, Rectangle, Stencil};
-use super::cut_outs::Holes;
+use super::cut_outs::AlphaMasks;
 use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::truth::{
@@ -16,7 +16,7 @@ use crate::visibility::truth::{
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Tests<'a> {
     /// Alpha test, by the surfaces of the items.
-    pub surfaces: Option<&'a Holes>,
+    pub surfaces: Option<&'a AlphaMasks>,
     /// Stencil test.
     pub stencil: Option<&'a Stencil>,
 }
@@ -27,7 +27,7 @@ pub trait Drawable: Body {
     fn rectangle(&self, canvas: &Canvas<Self>) -> Option<Rectangle>;
 
     /// Tests whether the body is opaque where a ray meets it.
-    fn is_opaque(&self, holes: &Holes, probe: &Self::Probe, at: &Self::At) -> bool;
+    fn is_opaque(&self, masks: &AlphaMasks, probe: &Self::Probe, at: &Self::At) -> bool;
 }
 
 impl Drawable for SolidBox {
@@ -35,8 +35,8 @@ impl Drawable for SolidBox {
         canvas.screen.rectangle(&self.b)
     }
 
-    fn is_opaque(&self, holes: &Holes, probe: &Probe, at: &Crossing) -> bool {
-        holes.opaque(self.item, &self.b, probe, at)
+    fn is_opaque(&self, masks: &AlphaMasks, probe: &Probe, at: &Crossing) -> bool {
+        masks.opaque(self.item, &self.b, probe, at)
     }
 }
 
@@ -45,14 +45,14 @@ impl Drawable for Facet {
         canvas.screen.triangle(self.corners, canvas.origin)
     }
 
-    fn is_opaque(&self, _: &Holes, _: &TriangleProbe, _: &Meeting) -> bool {
+    fn is_opaque(&self, _: &AlphaMasks, _: &TriangleProbe, _: &Meeting) -> bool {
         true
     }
 }
 
 /// Counts of a drawn list; `f64` for means per view.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize)]
-pub struct Tally<N = u64> {
+pub struct FragmentCounts<N = u64> {
     /// Samples whose rays are tested, including those that mark a stencil.
     pub asked_count: N,
     /// Samples that the stencil rejects.
@@ -79,7 +79,7 @@ struct Fragment<At> {
 #[derive(Clone, Debug)]
 pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
-    pub tally: Tally,
+    pub counts: FragmentCounts,
     /// Nearest opaque item of each sample, exact; the lowest id of a tie.
     pub(super) front: Vec<Option<(B::At, ItemId)>>,
     /// Fragments at the depth of the one in front whose id is higher.
@@ -92,7 +92,7 @@ impl<B: Drawable> Drawn<B> {
     /// An empty image of `samples` samples.
     pub fn new(samples: usize) -> Drawn<B> {
         Drawn {
-            tally: Tally::default(),
+            counts: FragmentCounts::default(),
             front: vec![None; samples],
             ties: Vec::new(),
             before: Vec::new(),
@@ -101,7 +101,7 @@ impl<B: Drawable> Drawn<B> {
 
     /// Empties the image.
     pub fn clear(&mut self) {
-        self.tally = Tally::default();
+        self.counts = FragmentCounts::default();
         self.front.fill(None);
         self.ties.clear();
         self.before.clear();
@@ -124,10 +124,10 @@ impl<B: Drawable> Drawn<B> {
                 let Some(at) = body.meet(probe, f64::INFINITY) else {
                     return;
                 };
-                self.tally.fragment_count += 1;
-                let mut holes = tests.surfaces.iter();
-                if !holes.all(|holes| body.is_opaque(holes, probe, &at)) {
-                    self.tally.clear_count += 1;
+                self.counts.fragment_count += 1;
+                let mut masks = tests.surfaces.iter();
+                if !masks.all(|masks| body.is_opaque(masks, probe, &at)) {
+                    self.counts.clear_count += 1;
                     return;
                 }
                 let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
@@ -135,15 +135,15 @@ impl<B: Drawable> Drawn<B> {
                     true => self.test(probe, Fragment { sample, item, at }),
                     false => self.front[sample].is_none_or(is_before),
                 };
-                self.tally.shaded_count += u64::from(passes);
+                self.counts.shaded_count += u64::from(passes);
                 if passes && !body.hides() && self.before.last() != Some(&item) {
                     self.before.push(item);
                 }
             });
-            self.tally.asked_count += tested;
-            self.tally.kept_out_count += kept_out;
+            self.counts.asked_count += tested;
+            self.counts.kept_out_count += kept_out;
         }
-        self.tally.covered_count = self.front.iter().flatten().count() as u64;
+        self.counts.covered_count = self.front.iter().flatten().count() as u64;
     }
 
     /// Applies the z-test; writes the fragment and returns true if it passes.
@@ -271,7 +271,7 @@ mod tests {
             drawn.draw_triangles(&canvas, surfaces, &triangles);
             assert_eq!(drawn.ids(), fronts, "{turn} {surfaces:?}");
             assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
-            assert!(drawn.tally.shaded_count >= drawn.tally.covered_count);
+            assert!(drawn.counts.shaded_count >= drawn.counts.covered_count);
             triangles.reverse();
         }
         truth.visible.len()

@@ -12,8 +12,8 @@ mod cut_outs;
 mod draw;
 
 pub use canvas::{Canvas, Rectangle, Screen, Stencil};
-pub use cut_outs::{CutOuts, Holes, MASKS, Mask, Surface};
-pub use draw::{Drawable, Drawn, Tally, Tests};
+pub use cut_outs::{AlphaMasks, CutOuts, MASKS, Mask, TiledMask};
+pub use draw::{Drawable, Drawn, FragmentCounts, Tests};
 
 #[cfg(test)]
 mod tests;

@@ -36,17 +36,17 @@ fn orders(solids: &Solids) -> [(Vec<ItemId>, Vec<SolidBox>); 2] {
 }
 
 /// Fragment counts of boxes in this order, ray by ray.
-fn tallied(rays: &Rays, grid: SampleGrid, index: &RayIndex, order: &[ItemId]) -> Tally {
+fn tallied(rays: &Rays, grid: SampleGrid, index: &RayIndex, order: &[ItemId]) -> FragmentCounts {
     let place = |item: ItemId| order.iter().position(|&other| other == item);
-    let mut tally = Tally::default();
+    let mut counts = FragmentCounts::default();
     for ray in rays.of_grid(grid) {
         let probe = index.probe(&ray);
         let mut met = index.all_along(&ray);
         met.sort_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
         met.dedup_by_key(|(item, _)| *item);
         met.sort_by_key(|(item, _)| place(*item));
-        tally.fragment_count += met.len() as u64;
-        tally.covered_count += u64::from(!met.is_empty());
+        counts.fragment_count += met.len() as u64;
+        counts.covered_count += u64::from(!met.is_empty());
         let mut front = None;
         for layer in &met {
             let is_nearer = front.is_none_or(|(item, at)| {
@@ -54,11 +54,11 @@ fn tallied(rays: &Rays, grid: SampleGrid, index: &RayIndex, order: &[ItemId]) ->
             });
             if is_nearer {
                 front = Some((&layer.0, &layer.1));
-                tally.shaded_count += 1;
+                counts.shaded_count += 1;
             }
         }
     }
-    tally
+    counts
 }
 
 /// Draws bodies in this order on an empty image.
@@ -117,7 +117,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
                 let drawn = draw(&canvas, bodies, &Tests::default());
                 assert_eq!(drawn.ids(), fronts, "{name} {n}");
                 assert_eq!(drawn.visible(&canvas), truth.visible, "{name} {n}");
-                assert!(drawn.tally.shaded_count >= drawn.tally.covered_count);
+                assert!(drawn.counts.shaded_count >= drawn.counts.covered_count);
             }
         }
     }
@@ -139,7 +139,7 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
         let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
         let canvas = Canvas::of(&rays, grid);
         for (items, bodies) in orders(&solids) {
-            let tally = tallied(&rays, grid, &index, &items);
+            let counts = tallied(&rays, grid, &index, &items);
             let drawn = draw(&canvas, bodies, &Tests::default());
             assert_eq!(
                 drawn.ids(),
@@ -151,10 +151,10 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
             // The same fragments are shaded, ray by ray.
             let asked_count = 0;
             assert_eq!(
-                tally,
-                Tally {
+                counts,
+                FragmentCounts {
                     asked_count,
-                    ..drawn.tally
+                    ..drawn.counts
                 },
                 "{items:?}"
             );

@@ -4,7 +4,7 @@
 
 use super::outline::Outline;
 use super::rect::{Candidate, Rect, Rects};
-use super::scene::OccluderScene;
+use super::scene::OccluderTree;
 use super::view::View;
 use crate::kernel::{Isa, LaneMask};
 use crate::visibility::SampleGrid;
@@ -39,7 +39,7 @@ pub trait OcclusionBuffer {
 pub fn draw<I: Isa, B: OcclusionBuffer>(
     isa: I,
     buffer: &mut B,
-    scene: &OccluderScene,
+    scene: &OccluderTree,
     view: &View,
     candidate: &Candidate,
 ) -> usize {

@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 
 use super::buffer::{CullStats, OcclusionBuffer, draw};
 use super::rect::{Candidate, Rect, Rects};
-use super::scene::OccluderScene;
+use super::scene::OccluderTree;
 use super::view::View;
 use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
@@ -73,24 +73,24 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     ///
     /// These are the items that no plane of the view's volume excludes, that some ray of the image
     /// may meet, and that are not hidden.
-    pub fn cull(&mut self, scene: &OccluderScene, view: &View, out: &mut Vec<ItemId>) -> CullStats {
-        self.kernel.run(Walk(self, scene, view, out))
+    pub fn cull(&mut self, scene: &OccluderTree, view: &View, out: &mut Vec<ItemId>) -> CullStats {
+        self.kernel.run(Cull(self, scene, view, out))
     }
 }
 
-struct Walk<'a, B>(
+struct Cull<'a, B>(
     &'a mut Interleaved<B>,
-    &'a OccluderScene,
+    &'a OccluderTree,
     &'a View<'a>,
     &'a mut Vec<ItemId>,
 );
 
-impl<B: OcclusionBuffer> Work for Walk<'_, B> {
+impl<B: OcclusionBuffer> Work for Cull<'_, B> {
     type Output = CullStats;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> CullStats {
-        let Walk(state, scene, view, out) = self;
+        let Cull(state, scene, view, out) = self;
         let mut stats = CullStats::default();
         if scene.len() == 0 {
             return stats;

@@ -6,7 +6,7 @@
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it enters the box,
 //! between near and far. A box that some ray enters before the near plane is not drawn. An occluder
 //! does not hide items at the same depth. The occluders of a mesh are boxes inside its items
-//! ([`OccluderScene::among`]): a ray that enters one has met the surface of the item before, unless
+//! ([`OccluderTree::with_inner_boxes`]): a ray that enters one has met the surface of the item before, unless
 //! that was before the near plane. The occluders of a map are boxes in its solid space, those of a
 //! terrain boxes below the ground; neither are items.
 
@@ -25,8 +25,8 @@ pub use interleaved::Interleaved;
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::Outline;
 pub use rect::{Candidate, Rect, Rects};
-pub use scene::{Faces, Occluder, OccluderScene};
-pub use view::{Linear, Projection, View};
+pub use scene::{Faces, Occluder, OccluderTree};
+pub use view::{LinearFunction, Projection, View};
 
 #[cfg(test)]
 pub use tests::{NoOcclusion, TwoPass, ZBuffer};

@@ -35,7 +35,7 @@ use glam::DVec3;
 
 use super::rect::Rect;
 use super::scene::Faces;
-use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
+use super::view::{LinearFunction, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
 use crate::kernel::each;
 
@@ -64,7 +64,7 @@ pub struct Outline {
     /// Range of columns outside of which the outline is empty.
     columns_within: [f64; 2],
     /// Linear functions whose minimum is the nearness, already rounded down.
-    faces: [Linear; 3],
+    faces: [LinearFunction; 3],
     face_count: usize,
     /// Lower bound of the nearness.
     floor: f64,
@@ -99,7 +99,7 @@ impl Outline {
             height,
             rows: [0.0, height],
             columns_within: [0.0, columns],
-            faces: [Linear::constant(f64::INFINITY); 3],
+            faces: [LinearFunction::constant(f64::INFINITY); 3],
             columns,
             covers_whole,
             ..Outline::default()
@@ -152,19 +152,19 @@ impl Outline {
         for j in (0..3).filter(|&j| !toward[j]) {
             let margin = |bound: f64| MARGIN * (bound.abs() + zero);
             if high[j].is_finite() {
-                let under = Linear::constant(high[j]).blend(1.0, &beside[j], -1.0);
+                let under = LinearFunction::constant(high[j]).blend(1.0, &beside[j], -1.0);
                 self.keep(under, margin(high[j]));
             }
             if low[j].is_finite() {
-                let over = beside[j].blend(1.0, &Linear::constant(low[j]), -1.0);
+                let over = beside[j].blend(1.0, &LinearFunction::constant(low[j]), -1.0);
                 self.keep(over, margin(low[j]));
             }
         }
         for i in (0..3).filter(|&i| toward[i]) {
             // Depths of entering i and leaving j, both times |f_i f_j|.
-            let entered = Linear::constant(near[i]).blend(1.0, &beside[i], -1.0);
+            let entered = LinearFunction::constant(near[i]).blend(1.0, &beside[i], -1.0);
             for j in (0..3).filter(|&j| j != i && toward[j] && far[j].is_finite()) {
-                let left = Linear::constant(far[j]).blend(1.0, &beside[j], -1.0);
+                let left = LinearFunction::constant(far[j]).blend(1.0, &beside[j], -1.0);
                 let edge = left.blend(f[i], &entered, -f[j]);
                 self.keep(edge, MARGIN * (near[i].abs() + far[j].abs() + zero));
             }
@@ -184,8 +184,8 @@ impl Outline {
     /// edge's terms can reach in the padded image; dividing by its slope, adding and rounding lose
     /// less than 2^-50 of that.
     #[inline(always)]
-    fn keep(&mut self, edge: Linear, margin: f64) {
-        let Linear { x, y, c } = edge;
+    fn keep(&mut self, edge: LinearFunction, margin: f64) {
+        let LinearFunction { x, y, c } = edge;
         let c = c - margin
             + match self.covers_whole {
                 true => x.min(0.0) + y.min(0.0),
@@ -319,7 +319,7 @@ fn mirrored(
     high: DVec3,
     view: &View,
     side: impl Fn(usize) -> f64,
-) -> ([bool; 3], [f64; 3], [f64; 3], [Linear; 3]) {
+) -> ([bool; 3], [f64; 3], [f64; 3], [LinearFunction; 3]) {
     let (mut toward, mut along) = ([false; 3], view.rays);
     let (mut near, mut far) = ([0.0; 3], [0.0; 3]);
     for axis in 0..3 {

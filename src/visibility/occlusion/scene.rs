@@ -29,7 +29,7 @@ pub struct Occluder {
 /// Every node except the last of a level has sixteen children: the children of box `j` of a level
 /// are block `j` of the level below.
 #[derive(Clone, Debug)]
-pub struct OccluderScene {
+pub struct OccluderTree {
     /// World position of the boxes' origin.
     pub(super) origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
@@ -46,44 +46,44 @@ pub struct OccluderScene {
     pub(super) bounds: WorldBox,
 }
 
-impl OccluderScene {
+impl OccluderTree {
     /// Tree of solid boxes, which are their own occluders. O(n log n).
-    pub fn of(solids: &Solids) -> OccluderScene {
+    pub fn of(solids: &Solids) -> OccluderTree {
         let written = solids.boxes.iter().copied();
         let bounds = WorldBox::union_of(written.clone());
-        let hiding = (0..).zip(solids.inner.iter().copied().zip(written));
-        let hiding = hiding.filter(|(_, (inner, _))| !inner.is_empty());
-        OccluderScene::sorted(solids.origin, &solids.outer, hiding, bounds)
+        let occluders = (0..).zip(solids.inner.iter().copied().zip(written));
+        let occluders = occluders.filter(|(_, (inner, _))| !inner.is_empty());
+        OccluderTree::build(solids.origin, &solids.outer, occluders, bounds)
     }
 
     /// Tree of items with inner boxes, and of occluders that are not items.
     ///
     /// O(n log n). `inner` pairs each inner box with its item, by ascending item. `blocks` are
     /// below ground or in the rock between the rooms of a map. All are scene-local.
-    pub fn among(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> OccluderScene {
+    pub fn with_inner_boxes(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> Self {
         let bounds = WorldBox::union_of(scene.written());
         let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
-        let hiding = inner.iter().copied().chain(numbered);
+        let occluders = inner.iter().copied().chain(numbered);
         // Rounded inward: the solid reaches a face if the rounded box does.
         let within = |inner: Aabb| (inner, WorldBox::within(&inner, scene.origin));
-        let hiding = hiding.map(|(number, inner)| (number, within(inner)));
+        let occluders = occluders.map(|(number, inner)| (number, within(inner)));
         let outer = [&scene.items[..], blocks].concat();
-        let mut among = OccluderScene::sorted(scene.origin, &outer, hiding, bounds);
-        among.items = scene.items.len();
-        among
+        let mut tree = OccluderTree::build(scene.origin, &outer, occluders, bounds);
+        tree.items = scene.items.len();
+        tree
     }
 
     /// Builds the tree over `outer` boxes, numbered by index.
     ///
-    /// Each of `hiding` is an occluder, rounded and as written, with the number of its outer box,
+    /// Each of `occluders` is a box, rounded and as written, with the number of its outer box,
     /// by ascending number.
-    fn sorted(
+    fn build(
         origin: DVec3,
         outer: &[Aabb],
-        hiding: impl Iterator<Item = (ItemId, (Aabb, WorldBox))>,
+        occluders: impl Iterator<Item = (ItemId, (Aabb, WorldBox))>,
         bounds: WorldBox,
-    ) -> OccluderScene {
-        let by_number = hiding.map(|(number, (inner, b))| {
+    ) -> OccluderTree {
+        let by_number = occluders.map(|(number, (inner, b))| {
             let faces = faces(b.min.cmple(bounds.min), b.max.cmpge(bounds.max));
             (number, Occluder { inner, faces })
         });
@@ -104,7 +104,7 @@ impl OccluderScene {
             occluders.extend(by_number[first..end].iter().map(|(_, own)| *own));
             first_occluders.push(occluders.len() as u32);
         }
-        OccluderScene {
+        OccluderTree {
             origin,
             levels,
             occluders,

@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::scene::{Faces, OccluderScene, faces};
+use super::scene::{Faces, OccluderTree, faces};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::visibility::{Rays, SampleGrid};
 
@@ -22,7 +22,7 @@ pub const TILE_HEIGHT: usize = 4;
 
 /// Linear function `x * a + y * b + c` over the image.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
-pub struct Linear {
+pub struct LinearFunction {
     /// Coefficient per column.
     pub x: f64,
     /// Coefficient per row.
@@ -31,16 +31,16 @@ pub struct Linear {
     pub c: f64,
 }
 
-impl Linear {
+impl LinearFunction {
     /// Constant function.
-    pub const fn constant(c: f64) -> Linear {
-        Linear { x: 0.0, y: 0.0, c }
+    pub const fn constant(c: f64) -> LinearFunction {
+        LinearFunction { x: 0.0, y: 0.0, c }
     }
 
     /// `a * self + b * other`.
     #[inline(always)]
-    pub fn blend(&self, a: f64, other: &Linear, b: f64) -> Linear {
-        Linear {
+    pub fn blend(&self, a: f64, other: &LinearFunction, b: f64) -> LinearFunction {
+        LinearFunction {
             x: a * self.x + b * other.x,
             y: a * self.y + b * other.y,
             c: a * self.c + b * other.c,
@@ -49,8 +49,8 @@ impl Linear {
 
     /// `a * self`.
     #[inline(always)]
-    pub fn times(&self, a: f64) -> Linear {
-        Linear {
+    pub fn times(&self, a: f64) -> LinearFunction {
+        LinearFunction {
             x: a * self.x,
             y: a * self.y,
             c: a * self.c,
@@ -106,7 +106,7 @@ pub struct View<'v> {
     ///
     /// Perspective: direction per unit of depth. Parallel: start in the plane of the eye, relative
     /// to the eye.
-    pub rays: [Linear; 3],
+    pub rays: [LinearFunction; 3],
     /// Largest sum of absolute coordinates of `rays` in the padded image.
     pub reach: f64,
     /// Error of the eye's coordinates, in units of 2^-52.
@@ -133,7 +133,7 @@ impl<'v> View<'v> {
     pub fn new(
         rays: &Rays,
         volume: &'v ConvexVolume,
-        scene: &OccluderScene,
+        scene: &OccluderTree,
         grid: SampleGrid,
     ) -> View<'v> {
         let camera = &rays.camera;
@@ -146,7 +146,7 @@ impl<'v> View<'v> {
         let corner = if parallel { corner } else { corner + forward };
         let across = u * ((right - left) / width);
         let down = v * ((bottom - top) / height);
-        let lines = [0, 1, 2].map(|axis| Linear {
+        let lines = [0, 1, 2].map(|axis| LinearFunction {
             x: across[axis],
             y: down[axis],
             c: corner[axis],
@@ -154,7 +154,7 @@ impl<'v> View<'v> {
         let columns = (grid.width as usize).next_multiple_of(TILE_WIDTH);
         let rows = (grid.height as usize).next_multiple_of(TILE_HEIGHT);
         let padded = [columns, rows].map(|size| size as f64);
-        let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
+        let reach = |l: &LinearFunction| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
         let reach: f64 = lines.iter().map(reach).sum();
         let eye = frame.eye - scene.origin;
         // Each parallel ray has its own start, rounded in world coordinates; the common start of

@@ -3,7 +3,7 @@
 //! Queries are the first item that a ray meets, the nearest few, and everything in the cursor's
 //! frustum.
 
-mod exactly;
+mod exact;
 mod wide_ray;
 
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
@@ -13,7 +13,7 @@ use crate::query::ItemId;
 use crate::visibility::truth::{Bodies, Body};
 use crate::visibility::{Guarantee, Ray, Rays, Row};
 
-pub use exactly::Linear;
+pub use exact::LinearScan;
 pub use wide_ray::WideRay;
 
 #[cfg(test)]
@@ -25,7 +25,7 @@ impl<B: Body> Bodies<B> {
     /// [Exact](Guarantee::Exact) answers are those of exact arithmetic, ties included.
     pub const BACK_ENDS: &'static [BackEnd<B>] = rows! { BackEnd { name, guarantee, summary, build }
         "linear", Guarantee::Exact, "every box or triangle, in exact arithmetic: the reference",
-            |bodies, _| Box::new(Linear(bodies.clone()));
+            |bodies, _| Box::new(LinearScan(bodies.clone()));
         "wide-ray", Guarantee::Exact,
             "16-wide tree, sixteen slab tests at once, the last step exact",
             |bodies, kernel| Box::new(WideRay::of(bodies, kernel));

@@ -199,7 +199,7 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
         let solids = Solids::of(&scene);
         let (wide, reference) = (
             WideRay::of(&Boxes::of(&solids), Kernel::best()),
-            Linear(Boxes::of(&solids)),
+            LinearScan(Boxes::of(&solids)),
         );
         let mut rng = SeededRng::new(9);
         let (mut hits, mut truth) = (Vec::new(), Vec::new());

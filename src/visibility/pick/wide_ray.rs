@@ -3,7 +3,7 @@
 //! A body is tested exactly as soon as its box may be entered before the nearest hit so far.
 
 use super::Pick;
-use super::exactly::{self, First};
+use super::exact::{self, NearestHit};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::Ray;
@@ -24,7 +24,7 @@ impl<B: Body> Pick for WideRay<B> {
     #[inline]
     fn first(&self, ray: &Ray) -> Option<ItemId> {
         let of = &self.0;
-        let mut first = First::<B>::new(of.probe(ray), ray.far);
+        let mut first = NearestHit::<B>::new(of.probe(ray), ray.far);
         of.walk(ray, &mut first);
         first.item(of.items)
     }
@@ -44,7 +44,7 @@ impl<B: Body> Pick for WideRay<B> {
             met: Vec::new(),
         };
         of.walk(ray, &mut found);
-        exactly::nearest::<B>(&probe, found.met, count, out);
+        exact::nearest::<B>(&probe, found.met, count, out);
     }
 }
 

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
+use super::graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator, rectangle};
 use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 
 /// Region locator for graphs with one box per region.
 #[derive(Debug)]
-struct Boxes {
+struct BoxLocator {
     regions: BoxGrid,
     /// Solids that close the regions' borders.
     ///
@@ -22,7 +22,7 @@ struct Boxes {
     borders: BoxGrid,
 }
 
-impl Ground for Boxes {
+impl RegionLocator for BoxLocator {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let first = out.len();
         self.regions.meeting(b, |id| out.push(id));
@@ -44,11 +44,11 @@ impl RegionGraph {
     /// Graph whose regions are boxes.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
         let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
-        let ground = Boxes {
+        let locator = BoxLocator {
             regions: BoxGrid::new(boxes),
             borders: BoxGrid::new(Vec::new()),
         };
-        RegionGraph::new(regions, openings, Arc::new(ground))
+        RegionGraph::new(regions, openings, Arc::new(locator))
     }
 
     /// Regions of a scene that is a tiling of boxes.
@@ -66,7 +66,7 @@ impl RegionGraph {
         let borders = graph.borders(scene).into_iter().zip(&scene.items);
         let borders = borders.filter_map(|(is_border, item)| is_border.then_some(item));
         let borders = borders.map(|item| WorldBox::of(item, scene.origin));
-        graph.ground = Arc::new(Boxes {
+        graph.locator = Arc::new(BoxLocator {
             borders: BoxGrid::new(borders.collect()),
             regions: BoxGrid::new(graph.parts.concat()),
         });

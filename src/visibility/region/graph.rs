@@ -11,7 +11,7 @@ use crate::visibility::Rays;
 pub type RegionId = u32;
 
 /// Locator of the regions at a box.
-pub trait Ground: Send + Sync + std::fmt::Debug {
+pub trait RegionLocator: Send + Sync + std::fmt::Debug {
     /// Appends the regions that a closed box meets, some perhaps twice.
     ///
     /// Returns `false` if part of the box may be in no region.
@@ -35,7 +35,7 @@ pub struct RegionGraph {
     pub openings: Vec<Opening>,
     /// Openings on the border of each region.
     pub exits: Vec<Vec<u32>>,
-    pub(super) ground: Arc<dyn Ground>,
+    pub(super) locator: Arc<dyn RegionLocator>,
 }
 
 impl RegionGraph {
@@ -43,7 +43,7 @@ impl RegionGraph {
     pub fn new(
         parts: Vec<Vec<WorldBox>>,
         openings: Vec<Opening>,
-        ground: Arc<dyn Ground>,
+        locator: Arc<dyn RegionLocator>,
     ) -> RegionGraph {
         let mut exits = vec![Vec::new(); parts.len()];
         for (i, opening) in (0u32..).zip(&openings) {
@@ -55,7 +55,7 @@ impl RegionGraph {
             parts,
             openings,
             exits,
-            ground,
+            locator,
         }
     }
 
@@ -81,7 +81,7 @@ impl RegionGraph {
         // Bound of the rounding of the corners.
         let slack = (eye.abs() + (max - min)) * f64::EPSILON * 8.0;
         let about = WorldBox::new(min - slack, max + slack);
-        let inside = self.ground.regions_at(&about, homes);
+        let inside = self.locator.regions_at(&about, homes);
         homes.sort_unstable();
         homes.dedup();
         inside

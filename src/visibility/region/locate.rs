@@ -134,7 +134,7 @@ impl RegionItems {
     /// Items that touch or meet each region; both are closed.
     ///
     /// Contains the items that touch a box of the region and those that
-    /// [meet](super::Ground::more_at) the region elsewhere. If regions have no height of their own
+    /// [meet](super::RegionLocator::more_at) the region elsewhere. If regions have no height of their own
     /// (those of a map), their boxes extend without end up and down. O(n log n) for items much
     /// smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
@@ -148,7 +148,7 @@ impl RegionItems {
             let b = WorldBox::of(item, scene.origin);
             met.clear();
             grid.meeting(&b, |part| met.push(owners[part as usize]));
-            graph.ground.more_at(&b, &mut met);
+            graph.locator.more_at(&b, &mut met);
             met.sort_unstable();
             met.dedup();
             met.iter().for_each(|&owner| lists[owner as usize].push(id));

@@ -18,7 +18,7 @@ mod row;
 mod search;
 
 pub use crate::index::IdSet;
-pub use graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId, rectangle};
+pub use graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator, rectangle};
 pub use locate::{RegionItems, without};
 pub use row::{BACK_ENDS, BackEnd, Pvs, Scratch};
 

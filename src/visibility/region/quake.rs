@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::graph::{Ground, RegionGraph, RegionId};
+use super::graph::{RegionGraph, RegionId, RegionLocator};
 use super::row::Pvs;
 use crate::scene::{BspChild, QuakeMap, WorldBox};
 
 /// Map units by which boxes are enlarged: map compilers round corners and planes.
 const SLACK: f64 = 0.125;
 
-impl Ground for QuakeMap {
+impl RegionLocator for QuakeMap {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let tree = &self.tree;
         let (centre, half) = ((b.min + b.max) / 2.0, (b.max - b.min) / 2.0 + SLACK);

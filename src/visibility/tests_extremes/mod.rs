@@ -20,7 +20,7 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::occlusion::{
-    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, TwoPass, View,
+    Interleaved, MaskedInner, OccluderTree, OcclusionBuffer, TwoPass, View,
 };
 use crate::visibility::rays::tests::in_image;
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
@@ -162,7 +162,7 @@ fn row(id: &str, back_end: &str, result: Result<(), String>) -> Row {
 /// A back end: its name, and a function from items in view to kept items.
 type BackEnd = (
     String,
-    Box<dyn Fn(&OccluderScene, &View, &[ItemId]) -> Vec<ItemId>>,
+    Box<dyn Fn(&OccluderTree, &View, &[ItemId]) -> Vec<ItemId>>,
 );
 
 /// Answers of a buffer, interleaved and in two passes.
@@ -210,7 +210,7 @@ fn occlusion_rows(
         Err(reason) => return vec![row(id, "occlusion", Err(reason))],
     };
     let solids = Solids::of(&scene);
-    let occluders = OccluderScene::of(&solids);
+    let occluders = OccluderTree::of(&solids);
     let view = View::new(&rays, &volume, &occluders, case.grid);
     let items = scene.items.iter().zip(0..);
     let in_view: Vec<ItemId> = items

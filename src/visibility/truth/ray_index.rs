@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::super::rays::Along;
 use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 use super::ray_tree::{RayTree, misses};
-use super::slabs::{Slabs, above};
+use super::slabs::{RaySlabTest, round_up};
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 use crate::scene::Surfaces;
@@ -39,7 +39,7 @@ pub type SurfaceIndex = BodyIndex<Facet>;
 #[derive(Clone, Debug)]
 pub struct Front<At> {
     /// Meetings with bodies that hide nothing.
-    through: Vec<(ItemId, At)>,
+    transparent: Vec<(ItemId, At)>,
     /// Hiding items that the ray meets first, ascending.
     ///
     /// More than one is a tie. Empty if the ray meets none from near to far.
@@ -90,7 +90,7 @@ impl<B: Body> BodyIndex<B> {
     pub fn walk<V: Visit<B>>(&self, ray: &Ray, visitor: &mut V) {
         // Cheaper than preparing the ray for the nodes.
         if !misses(ray, self.tree.zero, &self.tree.bounds) {
-            self.kernel.run(Walk(self, ray, visitor));
+            self.kernel.run(Traversal(self, ray, visitor));
         }
     }
 
@@ -102,7 +102,7 @@ impl<B: Body> BodyIndex<B> {
     }
 
     /// Minimum number of body tests for the rays of all samples of a grid.
-    pub fn tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
+    pub fn min_body_tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
         let mut tests = 0;
         for ray in rays.of_grid(grid) {
             let meeting = self.front_of(&ray).meeting;
@@ -142,15 +142,15 @@ impl<B, F: FnMut(&B) -> f64> Visit<B> for F {
     }
 }
 
-struct Walk<'a, B, V>(&'a BodyIndex<B>, &'a Ray, &'a mut V);
+struct Traversal<'a, B, V>(&'a BodyIndex<B>, &'a Ray, &'a mut V);
 
-impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
+impl<B: Body, V: Visit<B>> Work for Traversal<'_, B, V> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Walk(of, ray, visitor) = self;
-        let Some(slabs) = Slabs::of(ray, of.tree.zero, of.tree.bounds.reach()) else {
+        let Traversal(of, ray, visitor) = self;
+        let Some(slabs) = RaySlabTest::of(ray, of.tree.zero, of.tree.bounds.reach()) else {
             return of.tree.search_in_f64(ray, |place| {
                 visitor.visit(&of.bodies[place as usize].0);
             });
@@ -161,7 +161,7 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
             let latest = visitor.visit(&of.bodies[place as usize].0);
             if latest < limit {
                 limit = latest;
-                bound = bound.min(above(limit));
+                bound = bound.min(round_up(limit));
             }
             bound
         });
@@ -171,7 +171,7 @@ impl<B: Body, V: Visit<B>> Work for Walk<'_, B, V> {
 impl<At: Copy> Front<At> {
     pub(super) fn new() -> Front<At> {
         Front {
-            through: Vec::new(),
+            transparent: Vec::new(),
             front: Vec::new(),
             before: Vec::new(),
             meeting: None,
@@ -189,9 +189,9 @@ impl<At: Copy> Front<At> {
         is_opaque: &impl Fn(&B, &B::Probe, &At) -> bool,
     ) {
         let probe = index.probe(ray);
-        let (front, through) = (&mut self.front, &mut self.through);
+        let (front, transparent) = (&mut self.front, &mut self.transparent);
         front.clear();
-        through.clear();
+        transparent.clear();
         let mut best: Option<At> = None;
         let mut limit = ray.far;
         index.walk(ray, &mut |body: &B| {
@@ -199,7 +199,7 @@ impl<At: Copy> Front<At> {
                 return limit;
             };
             if !body.hides() {
-                through.push((body.item(), at));
+                transparent.push((body.item(), at));
                 return limit;
             }
             match best.map_or(Ordering::Less, |best| probe.compare(&at, &best)) {
@@ -217,7 +217,7 @@ impl<At: Copy> Front<At> {
         });
         let reached = |at: &At| best.is_none_or(|best| probe.compare(at, &best).is_le());
         self.before.clear();
-        let before = through.iter().filter(|(_, at)| reached(at));
+        let before = transparent.iter().filter(|(_, at)| reached(at));
         self.before.extend(before.map(|(item, _)| *item));
         for items in [&mut self.front, &mut self.before] {
             items.sort_unstable();

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::slabs::Slabs;
+use super::slabs::RaySlabTest;
 use crate::arithmetic::cross_sizes;
 use crate::geometry::{Aabb, BoxBlock};
 use crate::index::{NEAR, Record, Stack, by_surface_area};
@@ -43,13 +43,13 @@ impl RayTree {
         if !items.is_empty() {
             open.push((Part::of(&items, 0..items.len()), None));
         }
-        while let Some((part, above)) = open.pop() {
+        while let Some((part, round_up)) = open.pop() {
             let at = nodes.len();
             let mut parts = cut(&mut items, part);
             parts.sort_by_key(|part| part.len() > 1);
             let single = parts.iter().filter(|part| part.len() == 1).count();
             let child = Child::new(at, single);
-            match above {
+            match round_up {
                 None => root = child,
                 Some((node, lane)) => nodes[node].children[lane] = child.0,
             }
@@ -101,7 +101,7 @@ impl RayTree {
     /// The bound is the depth that the last `offer` returned. Near items come first as far as the
     /// tree order permits.
     #[inline(always)]
-    pub fn search<I: Isa>(&self, isa: I, slabs: &Slabs, mut offer: impl FnMut(u32) -> f32) {
+    pub fn search<I: Isa>(&self, isa: I, slabs: &RaySlabTest, mut offer: impl FnMut(u32) -> f32) {
         // The opaque pointer makes each node read the ray's numbers again, which AVX-512 does
         // within the instruction that needs them. If they were broadcast to vectors ahead of the
         // loop, they would be read back from the stack.
@@ -122,16 +122,16 @@ impl RayTree {
             let items = at.items();
             let left = tested.lanes;
             if left != 0 {
-                let less_entry = isa.to_array(tested.less_entry);
+                let neg_entry = isa.to_array(tested.neg_entry);
                 for lane in Bits((left & items).into()) {
                     let lane = lane as usize % LANES;
-                    if -less_entry[lane] <= bound {
+                    if -neg_entry[lane] <= bound {
                         bound = offer(node.children[lane]);
                     }
                 }
                 let mut nodes = Bits((left & !items).into()).map(|lane| {
                     let lane = lane as usize % LANES;
-                    (-less_entry[lane], node.children[lane])
+                    (-neg_entry[lane], node.children[lane])
                 });
                 // The nearest so far stays off the stack.
                 if let Some(mut next) = nodes.next() {
@@ -175,12 +175,12 @@ pub fn misses(ray: &Ray, zero: DVec3, bounds: &Aabb) -> bool {
     let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     let most = start.abs().max(min.abs()).max(max.abs()).max_element();
     let slack = DVec3::splat(most * (1.0 / (1u64 << 48) as f64));
-    let (above, below) = (start.cmpgt(max + slack), start.cmplt(min - slack));
-    if !(above | below).any() {
+    let (round_up, below) = (start.cmpgt(max + slack), start.cmplt(min - slack));
+    if !(round_up | below).any() {
         return false;
     }
     let d = ray.direction;
-    let away = (above & d.cmpge(DVec3::ZERO)) | (below & d.cmple(DVec3::ZERO));
+    let away = (round_up & d.cmpge(DVec3::ZERO)) | (below & d.cmple(DVec3::ZERO));
     if away.any() && ray.near >= 0.0 {
         return true;
     }

@@ -46,7 +46,7 @@ const SLACK_OF_NONE: f64 = (1u64 << 44) as f64;
 ///
 /// The margin covers the rounding (one part in 2^24) and, on underflow, less than 1e-37.
 #[inline(always)]
-pub fn above(depth: f64) -> f32 {
+pub fn round_up(depth: f64) -> f32 {
     (depth + (depth.abs() * f64::from(f32::EPSILON) + 1e-37)) as f32
 }
 
@@ -55,7 +55,7 @@ pub type Rows = [[f32; LANES]; 6];
 
 /// Constants of a ray for the slab test.
 #[derive(Clone, Copy, Debug)]
-pub struct Slabs {
+pub struct RaySlabTest {
     /// Rows that are crossed first and last, by axis.
     first: [usize; 3],
     last: [usize; 3],
@@ -69,17 +69,17 @@ pub struct Slabs {
 }
 
 /// Result of the test of sixteen boxes.
-pub struct Tested<I: Isa> {
+pub struct SlabHits<I: Isa> {
     /// Lanes of the boxes that the ray may meet.
     pub lanes: LaneMask,
     /// Lower bound of the depth of entry into each box, negated.
-    pub less_entry: I::Floats,
+    pub neg_entry: I::Floats,
 }
 
-impl Slabs {
+impl RaySlabTest {
     /// Prepares a ray; `None` for a ray that the analysis does not cover.
     #[inline(always)]
-    pub fn of(ray: &Ray, zero: DVec3, reach: Vec3) -> Option<Slabs> {
+    pub fn of(ray: &Ray, zero: DVec3, reach: Vec3) -> Option<RaySlabTest> {
         let start = ray.origin - zero;
         let largest = ray.direction.abs().max_element();
         // Written so that a NaN fails.
@@ -91,14 +91,14 @@ impl Slabs {
         if !covered || start.is_nan() || ray.direction.is_nan() {
             return None;
         }
-        let mut slabs = Slabs {
+        let mut slabs = RaySlabTest {
             first: [0, 1, 2],
             last: [3, 4, 5],
             inverse: [0.0; 3],
             low: [0.0; 3],
             high: [0.0; 3],
-            near: -above(-ray.near),
-            far: above(ray.far),
+            near: -round_up(-ray.near),
+            far: round_up(ray.far),
         };
         for axis in 0..3 {
             let along = ray.direction[axis];
@@ -124,7 +124,7 @@ impl Slabs {
 
     /// Boxes that the ray may meet at a depth of `most` or less.
     #[inline(always)]
-    pub fn test<I: Isa>(&self, isa: I, rows: &Rows, most: f32) -> Tested<I> {
+    pub fn test<I: Isa>(&self, isa: I, rows: &Rows, most: f32) -> SlabHits<I> {
         let entry = |axis: usize| {
             let sides = isa.load(&rows[self.first[axis] % 6]);
             let product = isa.mul(sides, isa.splat(-self.inverse[axis]));
@@ -135,13 +135,13 @@ impl Slabs {
             let product = isa.mul(sides, isa.splat(self.inverse[axis]));
             isa.add(product, isa.splat(self.high[axis]))
         };
-        let less_entry = isa.min(entry(0), isa.min(entry(1), entry(2)));
+        let neg_entry = isa.min(entry(0), isa.min(entry(1), entry(2)));
         let exit = isa.min(isa.min(exit(0), exit(1)), isa.min(exit(2), isa.splat(most)));
-        let less_first = isa.min(less_entry, isa.splat(-self.near));
-        Tested {
+        let neg_first = isa.min(neg_entry, isa.splat(-self.near));
+        SlabHits {
             // A rounded sum has the sign of the true one.
-            lanes: isa.not_below(isa.add(less_first, exit), 0.0),
-            less_entry,
+            lanes: isa.not_below(isa.add(neg_first, exit), 0.0),
+            neg_entry,
         }
     }
 }

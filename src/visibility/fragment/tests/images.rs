@@ -7,8 +7,8 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
     let solids = Solids::of(&load("city:n=400", &Default::default()).unwrap());
     let index = RayIndex::build(&solids);
     let mask = |item: usize| [Mask::Fence, Mask::Foliage].get(item % 3).copied();
-    let surface = |item| mask(item).map(|mask| Surface { mask, tile: 4.0 });
-    let surfaces = Holes {
+    let surface = |item| mask(item).map(|mask| TiledMask { mask, tile: 4.0 });
+    let surfaces = AlphaMasks {
         of_item: (0..solids.boxes.len()).map(surface).collect(),
     };
     let (mut through, mut clear) = (0, 0);
@@ -20,7 +20,7 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
             stencil: None,
         };
         let drawn = draw(&canvas, all(&solids), &tests);
-        clear += drawn.tally.clear_count;
+        clear += drawn.counts.clear_count;
         let solid = draw(&canvas, all(&solids), &Tests::default());
         let opaque =
             |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
@@ -103,7 +103,7 @@ fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
         behind += usize::from(!sees && entry(&portal).is_some());
     }
     assert!(behind > 3, "the premise: {behind}");
-    let (with, without) = (masked.tally, open.tally);
+    let (with, without) = (masked.counts, open.counts);
     assert_eq!(with.asked_count + with.kept_out_count, without.asked_count);
     assert!(with.fragment_count > 0 && with.fragment_count * 4 < without.fragment_count);
 }

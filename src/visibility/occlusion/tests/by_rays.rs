@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::{OccluderScene, View};
+use super::super::{OccluderTree, View};
 use crate::camera::{Camera, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;
 use crate::query::ItemId;
@@ -14,13 +14,13 @@ use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 pub struct Ready {
     pub scene: Scene,
     pub solids: Solids,
-    pub occluders: OccluderScene,
+    pub occluders: OccluderTree,
 }
 
 impl Ready {
     pub fn of(scene: Scene) -> Ready {
         let solids = Solids::of(&scene);
-        let occluders = OccluderScene::of(&solids);
+        let occluders = OccluderTree::of(&solids);
         Ready {
             scene,
             solids,

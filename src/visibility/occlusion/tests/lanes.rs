@@ -96,8 +96,8 @@ fn corners_held(ready: &Ready, view: &View, block: usize, rects: &Rects) -> usiz
             let depth = corner.dot(view.forward);
             // Relative to the axes of the image.
             let [across, down] = [
-                |l: &super::super::Linear| l.x,
-                |l: &super::super::Linear| l.y,
+                |l: &super::super::LinearFunction| l.x,
+                |l: &super::super::LinearFunction| l.y,
             ]
             .map(|of| DVec3::from_array(std::array::from_fn(|k| of(&view.rays[k]))));
             let start = DVec3::from_array(std::array::from_fn(|k| view.rays[k].c));

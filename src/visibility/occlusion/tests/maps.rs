@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::super::{MaskedInner, OccluderScene};
+use super::super::{MaskedInner, OccluderTree};
 use super::by_rays::{Ready, missing, with_view};
 use super::kept;
 use crate::camera::{Camera, Frame, Lens};
@@ -29,7 +29,7 @@ fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
     let blocks: Vec<Aabb> = blocks.collect();
     let ready = Ready {
         solids: Solids::of(&scene),
-        occluders: OccluderScene::among(&scene, &[], &blocks),
+        occluders: OccluderTree::with_inner_boxes(&scene, &[], &blocks),
         scene,
     };
     let index = SurfaceIndex::build(&map.surfaces(&ready.scene));

@@ -4,14 +4,14 @@
 
 use glam::DVec3;
 
-use super::super::{MaskedInner, OccluderScene};
+use super::super::{MaskedInner, OccluderTree};
 use super::by_rays::{Ready, missing, point_between, with_view};
 use super::kept;
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
-use crate::visibility::hiders::Hiders;
-use crate::visibility::inscribed::inner_boxes;
+use crate::visibility::inner_boxes::inner_boxes;
+use crate::visibility::occluders::SceneOccluders;
 use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
@@ -50,7 +50,7 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
         let inner = inner_boxes(&mesh, 12, 4, 1).0;
         let ready = Ready {
             solids: Solids::of(&scene),
-            occluders: OccluderScene::among(&scene, &inner, &[]),
+            occluders: OccluderTree::with_inner_boxes(&scene, &inner, &[]),
             scene,
         };
         let index = SurfaceIndex::build(&mesh);
@@ -76,19 +76,19 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
 fn boxes_below_the_ground_hide_nothing_that_is_visible() {
     for name in ["mesh:terrain:n=20k", "mesh:forest:n=20k"] {
         let scene = load(name, &Default::default()).unwrap();
-        let hiders = Hiders::of(&scene, None, 2, 1);
-        assert!(hiders.ground.as_ref().unwrap().row.box_count > 20);
+        let occluders = SceneOccluders::of(&scene, None, 2, 1);
+        assert!(occluders.ground.as_ref().unwrap().row.box_count > 20);
         let index = SurfaceIndex::build(scene.surfaces.as_ref().unwrap());
         let [open, bare] = [true, false].map(|is_open| Ready {
             solids: Solids::of(&scene),
-            occluders: hiders.from_eye(is_open).clone(),
+            occluders: occluders.from_eye(is_open).clone(),
             scene: scene.clone(),
         });
         let (mut removed, mut eyes, mut rng) = (0, [0, 0], SeededRng::new(5));
         for number in 0..600 {
             let camera = camera(&scene, &mut rng, number % 5 == 0);
             let rays = Rays::of(&camera).unwrap();
-            let is_open = hiders.is_open(&rays, || true);
+            let is_open = occluders.is_open(&rays, || true);
             eyes[usize::from(is_open)] += 1;
             let ready = if is_open { &open } else { &bare };
             with_view(ready, &camera, SampleGrid::new(96, 60), |view, rays| {
@@ -113,7 +113,7 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
     let scene =
         Scene::from_boxes("three", &[unit(0.0, 0.0), unit(2.0, 0.0), unit(4.0, 1.0)]).unwrap();
     let mut inner: Vec<_> = (0..).zip(scene.items.iter().copied()).collect();
-    let faces = |occluders: &OccluderScene, item| {
+    let faces = |occluders: &OccluderTree, item| {
         let mut positions = 0..occluders.len();
         let position = positions.find(|&at| occluders.item(at) == Some(item));
         let [occluder] = occluders.occluders(position.expect("an item")) else {
@@ -121,14 +121,14 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
         };
         occluder.faces
     };
-    let whole = OccluderScene::among(&scene, &inner, &[]);
-    let solid = OccluderScene::of(&Solids::of(&scene));
+    let whole = OccluderTree::with_inner_boxes(&scene, &inner, &[]);
+    let solid = OccluderTree::of(&Solids::of(&scene));
     for item in 0..3 {
         assert_eq!(faces(&whole, item), faces(&solid, item));
     }
     // The lower z of the first box is no longer at the floor.
     inner[0].1.min.z += 0.25;
-    let less = OccluderScene::among(&scene, &inner, &[]);
+    let less = OccluderTree::with_inner_boxes(&scene, &inner, &[]);
     assert_eq!(faces(&less, 0), faces(&solid, 0) & !(1 << 2));
     assert_eq!(faces(&less, 1), faces(&solid, 1));
     assert_ne!(faces(&solid, 0) & 1 << 2, 0);

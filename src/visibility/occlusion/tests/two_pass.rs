@@ -4,7 +4,7 @@
 
 use super::super::buffer::{OcclusionBuffer, draw};
 use super::super::rect::{Candidate, Rects};
-use super::super::scene::OccluderScene;
+use super::super::scene::OccluderTree;
 use super::super::view::View;
 use crate::geometry::BoxBlock;
 use crate::kernel::{Isa, Kernel, LANES, Work};
@@ -15,7 +15,7 @@ pub struct TwoPass<'a, B> {
     /// Buffer to draw into.
     pub buffer: B,
     /// The occluders.
-    pub scene: &'a OccluderScene,
+    pub scene: &'a OccluderTree,
     /// The view.
     pub view: &'a View<'a>,
     /// Items in the view, ascending.

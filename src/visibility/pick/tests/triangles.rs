@@ -34,7 +34,7 @@ fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {
 #[test]
 fn boxes_as_triangles_are_picked_as_boxes_are() {
     let scene = load("city:n=300", &Default::default()).unwrap();
-    let reference = Linear(Boxes::of(&Solids::of(&scene)));
+    let reference = LinearScan(Boxes::of(&Solids::of(&scene)));
     let facets = Facets::solid(&Surfaces::from_boxes(&scene), scene.items.len());
     let bounds = scene.bounds;
     let (min, max) = bounds.in_world(scene.origin);
@@ -114,7 +114,7 @@ fn every_instruction_set_finds_what_testing_all_finds() {
         };
         let wide = Kernel::available().map(|kernel| (kernel, WideRay::of(&facets, kernel)));
         let wide: Vec<_> = wide.collect();
-        let linear = Linear(facets.clone());
+        let linear = LinearScan(facets.clone());
         for _ in 0..1200 {
             let mut ray = Ray {
                 origin: facets.origin + grid(&mut rng, 20).as_dvec3() * 0.5,

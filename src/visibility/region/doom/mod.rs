@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::graph::{Ground, Opening, OpeningPlane, RegionGraph, RegionId};
+use super::graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator};
 use super::locate::BoxGrid;
 use super::row::Pvs;
 use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
@@ -155,14 +155,14 @@ impl DoomMap {
             let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
             parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
         }
-        let ground = Arc::new(SectorGround::new(self.clone()));
-        Ok(RegionGraph::new(parts, openings, ground))
+        let locator = Arc::new(SectorLocator::new(self.clone()));
+        Ok(RegionGraph::new(parts, openings, locator))
     }
 }
 
 /// Region locator of a map.
 #[derive(Debug)]
-struct SectorGround {
+struct SectorLocator {
     map: Arc<DoomMap>,
     /// Boxes of its linedefs, at height zero.
     lines: BoxGrid,
@@ -172,12 +172,12 @@ fn plan([x, y]: [i32; 2]) -> DVec2 {
     DVec2::new(x.into(), y.into())
 }
 
-impl SectorGround {
-    fn new(map: Arc<DoomMap>) -> SectorGround {
+impl SectorLocator {
+    fn new(map: Arc<DoomMap>) -> SectorLocator {
         let end = |end| WorldBox::at(plan(end).extend(0.0));
         let about = |line: &Linedef| WorldBox::union_of(line.ends.map(end));
         let lines = BoxGrid::new(map.lines.iter().map(about).collect());
-        SectorGround { map, lines }
+        SectorLocator { map, lines }
     }
 
     /// Sector at a point: the near side of the first linedef towards larger x.
@@ -223,7 +223,7 @@ fn meets(line: &Linedef, b: &WorldBox) -> bool {
 }
 
 /// Leaves of the map's tree differ from its sectors by a node builder's rounding.
-impl Ground for SectorGround {
+impl RegionLocator for SectorLocator {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let mut inside = true;
         let first = out.len();
@@ -258,7 +258,7 @@ mod tests {
     fn the_sector_at_the_height_of_a_vertex_is_that_of_a_point_beside_it() {
         for (name, least) in [("freedm-map12", 2000), ("freedm-map20", 10_000)] {
             let map = DoomMap::of_scene(&load(name, &Default::default()).unwrap()).unwrap();
-            let ground = SectorGround::new(map.clone());
+            let locator = SectorLocator::new(map.clone());
             let ends = map.lines.iter().flat_map(|line| line.ends);
             let (heights, places): (BTreeSet<i32>, BTreeSet<i32>) =
                 ends.map(|[x, y]| (y, x / 32)).unzip();
@@ -269,11 +269,11 @@ mod tests {
                     let about = WorldBox::new((p - 0.01).extend(0.0), (p + 0.01).extend(0.0));
                     let mut is_clear = true;
                     let all = |id| is_clear &= !meets(&map.lines[id as usize], &about);
-                    ground.lines.meeting(&about, all);
+                    locator.lines.meeting(&about, all);
                     if is_clear {
-                        let beside = ground.sector_at(p + DVec2::Y * 0.01);
-                        assert_eq!(ground.sector_at(p), beside, "{name} {p}");
-                        let near = ground.sector_at(p + DVec2::Y * 6e-17);
+                        let beside = locator.sector_at(p + DVec2::Y * 0.01);
+                        assert_eq!(locator.sector_at(p), beside, "{name} {p}");
+                        let near = locator.sector_at(p + DVec2::Y * 6e-17);
                         assert_eq!(near, beside, "{name} {p}");
                         checked += 1;
                     }

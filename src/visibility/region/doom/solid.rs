@@ -38,7 +38,7 @@ impl DoomMap {
     /// Searches large rectangles of the plan, whose grid lines are those of the map's corners.
     /// Boxes may overlap, so there are no seams between them. O(heights * boxes of each * cells).
     pub fn solid_boxes(&self, [low, high]: [f64; 2]) -> Vec<WorldBox> {
-        let Some(plan) = Plan::of(self) else {
+        let Some(plan) = PlanGrid::of(self) else {
             return Vec::new();
         };
         let mut found = Vec::new();
@@ -73,10 +73,10 @@ impl DoomMap {
 }
 
 /// Ranges of columns and rows, ends exclusive.
-type Cells = [[usize; 2]; 2];
+type CellRect = [[usize; 2]; 2];
 
 /// Plan view of the map, in cells between the grid lines of its corners.
-struct Plan {
+struct PlanGrid {
     /// Grid lines by axis, ascending.
     lines: [Vec<i32>; 2],
     columns: usize,
@@ -86,9 +86,9 @@ struct Plan {
     cells: Vec<Option<[f64; 2]>>,
 }
 
-impl Plan {
+impl PlanGrid {
     /// Builds the plan; `None` if some sector of the map is not closed.
-    fn of(map: &DoomMap) -> Option<Plan> {
+    fn of(map: &DoomMap) -> Option<PlanGrid> {
         let lines = [0, 1].map(|axis| {
             let ends = map.lines.iter().flat_map(|line| line.ends);
             let lines = distinct(ends.map(|end| end[axis]).collect());
@@ -96,7 +96,7 @@ impl Plan {
             lines.into_iter().step_by(step).collect::<Vec<_>>()
         });
         let [columns, rows] = [0, 1].map(|axis| lines[axis].len().saturating_sub(1));
-        let mut plan = Plan {
+        let mut plan = PlanGrid {
             lines,
             columns,
             cells: vec![None; columns * rows],
@@ -138,19 +138,19 @@ impl Plan {
         let corner = |end: usize| [self.lines[0][column + end], self.lines[1][row + end]];
         let [[x, y], [u, v]] = [corner(0), corner(1)];
         let corners = [[x, y], [u, y], [x, v], [u, v]];
-        let parts = |from, to| corners.iter().all(|&p| turn(from, to, p) >= 0);
-        !(parts(a, b) || parts(b, c) || parts(c, a))
+        let separates = |from, to| corners.iter().all(|&p| turn(from, to, p) >= 0);
+        !(separates(a, b) || separates(b, c) || separates(c, a))
     }
 
     /// Width and depth of a rectangle, map units.
-    fn size(&self, cells: &Cells) -> [f64; 2] {
+    fn size(&self, cells: &CellRect) -> [f64; 2] {
         [0, 1].map(|axis| {
             let [first, end] = cells[axis].map(|line| self.lines[axis][line]);
             f64::from(end - first)
         })
     }
 
-    fn box_of(&self, cells: &Cells, low: f64, high: f64) -> WorldBox {
+    fn box_of(&self, cells: &CellRect, low: f64, high: f64) -> WorldBox {
         let corner = |end: usize, z| {
             let [x, y] = [0, 1].map(|axis| self.lines[axis][cells[axis][end]]);
             DVec3::new(x.into(), y.into(), z)
@@ -161,8 +161,8 @@ impl Plan {
     /// Chooses maximal rectangles of solid cells, the longest first.
     ///
     /// Each must add enough area of `own` cells that no earlier one covers ([`LEAST_NEW`]).
-    fn rectangles(&self, solid: &[bool], own: impl Fn(usize) -> bool) -> Vec<Cells> {
-        let mut all: Vec<([f64; 2], Cells)> = Vec::new();
+    fn rectangles(&self, solid: &[bool], own: impl Fn(usize) -> bool) -> Vec<CellRect> {
+        let mut all: Vec<([f64; 2], CellRect)> = Vec::new();
         for_each_maximal(solid, self.columns, |cells| {
             let [width, depth] = self.size(&cells);
             if width.max(depth) >= LEAST_SIDE {
@@ -206,7 +206,7 @@ impl Plan {
 /// Calls `found` with each maximal rectangle of true cells.
 ///
 /// O(cells), with a stack of column depths per row (the largest rectangle in a histogram).
-fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(Cells)) {
+fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(CellRect)) {
     let mut deep = vec![0; columns];
     let mut open: Vec<(usize, usize)> = Vec::new();
     let mut rows = cells.chunks_exact(columns.max(1)).enumerate().peekable();
@@ -219,8 +219,8 @@ fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(Cells)
             let depth = deep.get(column).copied().unwrap_or(0);
             let mut start = column;
             while let Some((first, high)) = open.pop_if(|(_, high)| *high > depth) {
-                let goes_on = below.is_some_and(|below| below[first..column].iter().all(|&b| b));
-                if !goes_on {
+                let continues = below.is_some_and(|below| below[first..column].iter().all(|&b| b));
+                if !continues {
                     found([[first, column], [row + 1 - high, row + 1]]);
                 }
                 start = first;
@@ -339,7 +339,7 @@ mod tests {
             let mut rng = SeededRng::new(3);
             let is_open = |at| {
                 graph
-                    .ground
+                    .locator
                     .regions_at(&WorldBox::new(at, at), &mut Vec::new())
             };
             let mut open = 0;
@@ -362,7 +362,7 @@ mod tests {
         for _ in 0..300 {
             let (columns, rows) = (1 + rng.below(6), 1 + rng.below(6));
             let cells: Vec<bool> = (0..columns * rows).map(|_| rng.below(4) > 0).collect();
-            let is_whole = |[[x0, x1], [y0, y1]]: Cells| {
+            let is_whole = |[[x0, x1], [y0, y1]]: CellRect| {
                 x1 <= columns
                     && y1 <= rows
                     && (y0..y1).all(|y| (x0..x1).all(|x| cells[y * columns + x]))

@@ -20,7 +20,7 @@ pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
 }
 
 /// Part of a linedef's wall: the side that it faces, lower and upper height.
-type Part = (usize, [f64; 2]);
+type WallPart = (usize, [f64; 2]);
 
 impl DoomMap {
     /// Triangles of the map; `scene` must come from [`WadMap::into_scene`].
@@ -120,13 +120,13 @@ impl DoomMap {
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let edges = &self.edges[sector as usize];
         let ends: Vec<Point> = edges.iter().map(|[from, _]| *from).collect();
-        edges.iter().flat_map(|edge| parted(*edge, &ends)).collect()
+        edges.iter().flat_map(|edge| split(*edge, &ends)).collect()
     }
 }
 
 /// Parts of a linedef's wall between sectors of these heights.
-fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterator<Item = Part> {
-    let parts = match line.sectors.map(|sector| sector.map(&heights)) {
+fn parts(line: &Linedef, range: impl Fn(RegionId) -> [f64; 2]) -> impl Iterator<Item = WallPart> {
+    let parts = match line.sectors.map(|sector| sector.map(&range)) {
         [Some(a), Some(b)] => {
             // The lower part is visible from the side of the lower floor, the upper part from the
             // side of the higher ceiling.
@@ -152,7 +152,7 @@ impl Shape {
         self.points.len() as u32 - 1
     }
 
-    fn wall(&mut self, line: &Linedef, (side, [low, high]): Part) {
+    fn wall(&mut self, line: &Linedef, (side, [low, high]): WallPart) {
         let [mut from, mut to] = line.ends;
         // Seen from its right side, a linedef runs to the right.
         if side == 1 {
@@ -198,7 +198,7 @@ fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
 }
 
 /// Splits an edge at all given points that lie on it.
-pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
+pub fn split([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
     let away = |p: Point| [0, 1].map(|k| (p[k] - from[k]).abs()).iter().sum::<i32>();
     let within =
         |p: &Point| (0..2).all(|k| (from[k].min(to[k])..=from[k].max(to[k])).contains(&p[k]));

@@ -84,7 +84,7 @@ pub fn sectors(map: &DoomMap, graph: &RegionGraph, ray: &Ray, seen: &mut IdSet) 
     let (start, mut met) = (ray.at(ray.near), Vec::new());
     // The sector of the point itself follows those of linedefs near it.
     graph
-        .ground
+        .locator
         .regions_at(&WorldBox::new(start, start), &mut met);
     let Some(mut sector) = met.pop() else {
         return;

@@ -91,5 +91,5 @@ pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
     let mut openings = graph.openings.to_vec();
     openings.remove(index);
     let regions = (0..graph.len() as u32).map(|r| graph.parts[r as usize].to_vec());
-    RegionGraph::new(regions.collect(), openings, graph.ground.clone())
+    RegionGraph::new(regions.collect(), openings, graph.locator.clone())
 }

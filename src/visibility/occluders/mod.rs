@@ -10,37 +10,37 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::occlusion::OccluderScene;
+use super::occlusion::OccluderTree;
 use super::{Rays, Solids};
 use crate::geometry::Aabb;
 use crate::scene::{Scene, WorldBox};
-use crate::visibility::inscribed::{CELLS, inner_boxes};
+use crate::visibility::inner_boxes::{CELLS, inner_boxes};
 use crate::visibility::region::doom::DoomMap;
 
-pub use super::inscribed::InnerRow;
-pub use ground::{Ground, GroundRow};
+pub use super::inner_boxes::InnerBoxStats;
+pub use ground::{Ground, GroundStats};
 
 /// The occluders of a scene.
-pub struct Hiders {
-    all: OccluderScene,
+pub struct SceneOccluders {
+    all: OccluderTree,
     /// Occluders that belong to items.
     ///
     /// Used for eyes outside the rooms of a map or not above the ground of a mesh.
-    bare: Option<OccluderScene>,
+    items_only: Option<OccluderTree>,
     /// Statistics of the boxes inside the items of a mesh.
-    pub inner: Option<InnerRow>,
+    pub inner: Option<InnerBoxStats>,
     /// Ground of a mesh with the boxes below it.
     pub ground: Option<Ground>,
     /// Statistics of the boxes in the solid space of a map.
-    pub blocks: Option<BlocksRow>,
+    pub blocks: Option<BlockStats>,
 }
 
-impl Hiders {
+impl SceneOccluders {
     /// Builds the occluders of a scene.
     ///
     /// `solids` are the items if they are solid boxes; items of triangles get up to `most` inner
     /// boxes each.
-    pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
+    pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Self {
         let inner = scene.surfaces.as_ref();
         let inner = inner.map(|surfaces| inner_boxes(surfaces, CELLS, most, threads));
         let (within, inner) = inner.unzip();
@@ -49,13 +49,13 @@ impl Hiders {
         let within = within.unwrap_or_default();
         let below = ground.as_ref().map(|ground| &ground.boxes);
         let of_no_item = below.or(blocks.as_ref());
-        let among = |blocks: &[_]| OccluderScene::among(scene, &within, blocks);
-        Hiders {
+        let tree = |blocks: &[_]| OccluderTree::with_inner_boxes(scene, &within, blocks);
+        SceneOccluders {
             all: match solids {
-                Some(solids) => OccluderScene::of(solids),
-                None => among(of_no_item.map_or(&[][..], |boxes| boxes)),
+                Some(solids) => OccluderTree::of(solids),
+                None => tree(of_no_item.map_or(&[][..], |boxes| boxes)),
             },
-            bare: of_no_item.map(|_| among(&[])),
+            items_only: of_no_item.map(|_| tree(&[])),
             blocks: row,
             inner,
             ground,
@@ -69,14 +69,14 @@ impl Hiders {
     pub fn is_open(&self, rays: &Rays, is_inside: impl FnOnce() -> bool) -> bool {
         match &self.ground {
             Some(ground) => ground.rises_above(rays) && ground.is_below(rays),
-            None => self.bare.is_none() || is_inside(),
+            None => self.items_only.is_none() || is_inside(),
         }
     }
 
-    /// Occluders for an eye that is [in the open](Hiders::is_open) or not.
-    pub fn from_eye(&self, is_open: bool) -> &OccluderScene {
-        match &self.bare {
-            Some(bare) if !is_open => bare,
+    /// Occluders for an eye that is [in the open](SceneOccluders::is_open) or not.
+    pub fn from_eye(&self, is_open: bool) -> &OccluderTree {
+        match &self.items_only {
+            Some(items_only) if !is_open => items_only,
             _ => &self.all,
         }
     }
@@ -84,7 +84,7 @@ impl Hiders {
 
 /// Statistics of the boxes in the solid space of a map.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct BlocksRow {
+pub struct BlockStats {
     /// Number of boxes; 0 if a sector is not closed.
     pub box_count: usize,
     /// Number of sectors whose linedefs are not closed: rays leave the map there.
@@ -94,12 +94,12 @@ pub struct BlocksRow {
 }
 
 /// Solid boxes of a map over its items' heights, scene-local; else `None`.
-pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlocksRow)> {
+pub fn blocks(scene: &Scene) -> Option<(Vec<Aabb>, BlockStats)> {
     let map = DoomMap::of_scene(scene)?;
     let begun = Instant::now();
     let WorldBox { min, max } = WorldBox::union_of(scene.written());
     let boxes = map.solid_boxes([min.z, max.z]);
-    let row = BlocksRow {
+    let row = BlockStats {
         box_count: boxes.len(),
         unclosed_sector_count: map.unclosed().len(),
         build_ns: begun.elapsed().as_nanos() as f64,

@@ -12,7 +12,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::inscribed::cells::Grid;
+use super::inner_boxes::cells::Grid;
 use crate::arithmetic::Expansion;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
@@ -21,11 +21,11 @@ use crate::threads;
 use crate::visibility::region::without;
 use crate::visibility::triangle::{Eye, faces, normal};
 
-pub(crate) use super::inscribed::cells::Cells;
+pub(crate) use super::inner_boxes::cells::Cells;
 
 /// Boxes proven to be inside an item.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Inscribed {
+pub struct InnerBoxes {
     /// Scene-local and overlapping, largest gain first.
     ///
     /// The open interior of each box is disjoint from the surface component that it lies in.
@@ -56,12 +56,12 @@ const TRIES: usize = 4;
 /// Each is made of whole cells of a grid with `cells` (4 to 64) per axis over a connected
 /// component; the largest gains win. Only opaque triangles count; `None` if these are not closed or
 /// no box is found. O(t + cells⁴) per box.
-pub fn inscribed_boxes(
+pub fn inner_boxes_of(
     surfaces: &Surfaces,
     item: usize,
     cells: usize,
     most: usize,
-) -> Option<Inscribed> {
+) -> Option<InnerBoxes> {
     let solid = surfaces.solid_part(item);
     if solid.triangles.is_empty() || solid.open_edges(0) != 0 {
         return None;
@@ -82,7 +82,7 @@ pub fn inscribed_boxes(
     found.truncate(most);
     let share = found.iter().map(|(gain, _)| gain).sum::<f64>() / volume;
     let boxes: Vec<Aabb> = found.into_iter().map(|(_, b)| b).collect();
-    (!boxes.is_empty()).then_some(Inscribed {
+    (!boxes.is_empty()).then_some(InnerBoxes {
         boxes,
         share,
         volume,
@@ -169,7 +169,7 @@ fn parts(surfaces: &Surfaces) -> Vec<Vec<[Vec3; 3]>> {
 
 /// Statistics of the boxes inside the items of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct InnerRow {
+pub struct InnerBoxStats {
     /// Items of the mesh.
     pub item_count: usize,
     /// Items with an inner box: opaque, closed, and large enough for one.
@@ -186,7 +186,7 @@ pub struct InnerRow {
     pub build_ns: f64,
 }
 
-/// Inner boxes of each item of a mesh, as found by [`inscribed_boxes`].
+/// Inner boxes of each item of a mesh, as found by [`inner_boxes_of`].
 ///
 /// Pairs of item and box by ascending item, scene-local. Independent of the number of threads.
 pub fn inner_boxes(
@@ -194,9 +194,9 @@ pub fn inner_boxes(
     cells: usize,
     most: usize,
     threads: usize,
-) -> (Vec<(ItemId, Aabb)>, InnerRow) {
+) -> (Vec<(ItemId, Aabb)>, InnerBoxStats) {
     let begun = Instant::now();
-    let boxes_of = |item| inscribed_boxes(surfaces, item, cells, most);
+    let boxes_of = |item| inner_boxes_of(surfaces, item, cells, most);
     let found = threads::map(threads, 0..surfaces.items(), boxes_of);
     let (mut boxes, mut boxed_count) = (Vec::new(), 0);
     let [mut inner, mut whole] = [0.0, 0.0];
@@ -207,7 +207,7 @@ pub fn inner_boxes(
         boxed_count += 1;
         boxes.extend(found.boxes.iter().map(|b| (item, *b)));
     }
-    let row = InnerRow {
+    let row = InnerBoxStats {
         item_count: surfaces.items(),
         boxed_count,
         box_limit: most,
@@ -333,7 +333,7 @@ mod tests {
     #[test]
     fn boxes_are_found_and_are_inside() {
         let statue = mesh("statue", 5000);
-        let found = inscribed_boxes(&statue, 0, CELLS, MOST_BOXES).unwrap();
+        let found = inner_boxes_of(&statue, 0, CELLS, MOST_BOXES).unwrap();
         assert!(found.share > 0.45 && found.share < 1.0, "{found:?}");
         // Independent check: from random points of the boxes the surface is all around.
         let mut rng = SeededRng::new(1);
@@ -364,7 +364,7 @@ mod tests {
         let spheres = mesh("spheres", 5 * 1280);
         for item in 0..spheres.items() {
             // The cube inscribed in a ball has 2 / (sqrt(3) pi) = 37 % of its volume.
-            let found = inscribed_boxes(&spheres, item, CELLS, MOST_BOXES).unwrap();
+            let found = inner_boxes_of(&spheres, item, CELLS, MOST_BOXES).unwrap();
             let whole = spheres.volume(item);
             let first = volume(&WorldBox::of(&found.boxes[0], DVec3::ZERO)) / whole;
             assert!(first > 0.25 && first < 0.37, "{first}");
@@ -391,7 +391,7 @@ mod tests {
             assert!(!is_inside(&surfaces, item, &larger));
             let away = b.max + 1.0;
             assert!(!is_inside(&surfaces, item, &Aabb::new(away, away + 1.0)));
-            let share = inscribed_boxes(&surfaces, item, 8, 1).unwrap().share;
+            let share = inner_boxes_of(&surfaces, item, 8, 1).unwrap().share;
             assert!((share - 1.0).abs() < 1e-9, "all of a box: {share}");
         }
     }
@@ -420,7 +420,7 @@ mod tests {
         let mut house = Surfaces::about(DVec3::ZERO);
         let at = |x: f32| Aabb::new(Vec3::X * x, Vec3::X * x + Vec3::splat(4.0));
         house.push_box(SurfaceKind::Opaque, false, &at(0.0));
-        let alone = inscribed_boxes(&house, 0, 8, 2);
+        let alone = inner_boxes_of(&house, 0, 8, 2);
         let (first, end) = (house.triangles.len(), house.of_item[0].end);
         house.push_box(SurfaceKind::Opaque, false, &at(9.0));
         house.triangles[first..]
@@ -428,7 +428,7 @@ mod tests {
             .for_each(|t| t.swap(0, 1));
         house.of_item.truncate(1);
         house.of_item[0].end = 2 * end;
-        assert_eq!(inscribed_boxes(&house, 0, 8, 2), alone);
+        assert_eq!(inner_boxes_of(&house, 0, 8, 2), alone);
     }
 
     #[test]
@@ -436,21 +436,21 @@ mod tests {
         let mut house = Surfaces::about(DVec3::ZERO);
         let walls = Aabb::new(Vec3::ZERO, Vec3::splat(4.0));
         house.push_box(SurfaceKind::Opaque, false, &walls);
-        let whole = inscribed_boxes(&house, 0, 8, 1);
+        let whole = inner_boxes_of(&house, 0, 8, 1);
         assert_eq!(whole.as_ref().unwrap().volume, 64.0);
         // Adds glass copies of the first two triangles.
         house.triangles.extend_from_within(..2);
         house.of_item[0].end += 2;
         house.kinds.extend([SurfaceKind::Clear; 2]);
         house.two_sided.extend([true; 2]);
-        assert_eq!(inscribed_boxes(&house, 0, 8, 1), whole);
+        assert_eq!(inner_boxes_of(&house, 0, 8, 1), whole);
         assert_eq!(
             inner_boxes(&house, 8, 1, 1).1.volume_share,
             Some(whole.unwrap().share)
         );
         // A wall of glass leaves the house open.
         house.kinds[0] = SurfaceKind::Clear;
-        assert_eq!(inscribed_boxes(&house, 0, 8, 1), None);
+        assert_eq!(inner_boxes_of(&house, 0, 8, 1), None);
     }
 
     #[test]

@@ -8,27 +8,27 @@ use crate::visibility::Ray;
 use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
 
 /// An item and the point where a ray meets it.
-type Met<B> = (ItemId, <B as Body>::At);
+type Hit<B> = (ItemId, <B as Body>::At);
 
 /// Exact order by depth, then by id.
 #[inline]
-fn order<B: Body>(probe: &B::Probe, a: &Met<B>, b: &Met<B>) -> Ordering {
+fn order<B: Body>(probe: &B::Probe, a: &Hit<B>, b: &Hit<B>) -> Ordering {
     probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
 }
 
 /// Nearest candidate so far that a ray meets.
-pub(super) struct First<B: Body> {
+pub(super) struct NearestHit<B: Body> {
     probe: B::Probe,
     /// Upper bound of the depth of the nearest candidate.
     limit: f64,
-    best: Option<Met<B>>,
+    best: Option<Hit<B>>,
 }
 
-impl<B: Body> First<B> {
+impl<B: Body> NearestHit<B> {
     /// Starts without candidates; ignores everything beyond `limit`.
     #[inline]
-    pub fn new(probe: B::Probe, limit: f64) -> First<B> {
-        First {
+    pub fn new(probe: B::Probe, limit: f64) -> NearestHit<B> {
+        NearestHit {
             probe,
             limit,
             best: None,
@@ -44,12 +44,12 @@ impl<B: Body> First<B> {
     }
 }
 
-impl<B: Body> Visit<B> for First<B> {
+impl<B: Body> Visit<B> for NearestHit<B> {
     #[inline(always)]
     fn visit(&mut self, body: &B) -> f64 {
         if let Some(at) = body.meet(&self.probe, self.limit) {
             let met = (body.item(), at);
-            let is_first = |best: Met<B>| order::<B>(&self.probe, &met, &best).is_lt();
+            let is_first = |best: Hit<B>| order::<B>(&self.probe, &met, &best).is_lt();
             if self.best.is_none_or(is_first) {
                 self.best = Some(met);
                 self.limit = self.limit.min(B::Probe::at_most(&at));
@@ -64,7 +64,7 @@ impl<B: Body> Visit<B> for First<B> {
 /// Includes all items at the depth of the last of them.
 pub(super) fn nearest<B: Body>(
     probe: &B::Probe,
-    mut met: Vec<Met<B>>,
+    mut met: Vec<Hit<B>>,
     count: usize,
     out: &mut Vec<ItemId>,
 ) {
@@ -102,12 +102,12 @@ impl<B: Body> Pick for BodyIndex<B> {
 
 /// Linear search over all bodies, item by item.
 #[derive(Clone, Debug)]
-pub struct Linear<B>(pub Bodies<B>);
+pub struct LinearScan<B>(pub Bodies<B>);
 
-impl<B: Body> Pick for Linear<B> {
+impl<B: Body> Pick for LinearScan<B> {
     /// O(n).
     fn first(&self, ray: &Ray) -> Option<ItemId> {
-        let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
+        let mut first = NearestHit::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
         for body in &self.0.all {
             first.visit(body);
         }

@@ -22,7 +22,7 @@ use serde::Serialize;
 use crate::geometry::Aabb;
 use crate::scene::{Scene, SurfaceKind, UpAxis, WorldBox};
 use crate::visibility::Rays;
-use crate::visibility::inscribed::{Cells, turn};
+use crate::visibility::inner_boxes::{Cells, turn};
 
 /// Cells along each side of the rectangle and along the height.
 const CELLS: usize = 64;
@@ -33,7 +33,7 @@ const LEAST_GAIN: f64 = 1.0 / 16384.0;
 
 /// Counts of the occluder boxes below the ground of a mesh.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct GroundRow {
+pub struct GroundStats {
     /// Items that are ground.
     pub item_count: usize,
     /// Number of boxes below the ground.
@@ -51,7 +51,7 @@ pub struct Ground {
     /// Overlapping boxes that reach below everything else in the scene.
     pub boxes: Vec<Aabb>,
     /// Counts of the boxes.
-    pub row: GroundRow,
+    pub row: GroundStats,
     up: UpAxis,
     /// Triangles rotated to z up, like the fields below.
     triangles: Vec<[Vec3; 3]>,
@@ -93,7 +93,7 @@ impl Ground {
             boxes.push(Aabb::new(up.from_z_up(min), up.from_z_up(max)));
         }
         Some(Ground {
-            row: GroundRow {
+            row: GroundStats {
                 item_count: items.len(),
                 box_count: boxes.len(),
                 volume_share: (held > 0.0).then(|| held / below),
