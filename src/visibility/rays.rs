@@ -118,15 +118,15 @@ impl Rays {
 }
 
 /// A ray prepared for exact tests against one kind of body.
-pub trait Along: Copy {
+pub trait RayProbe: Copy {
     /// A point of the ray on the surface of a body.
-    type At: Copy + Debug;
+    type Hit: Copy + Debug;
 
     /// Compares the depths of two such points along the ray, exactly.
-    fn compare(&self, a: &Self::At, b: &Self::At) -> Ordering;
+    fn compare(&self, a: &Self::Hit, b: &Self::Hit) -> Ordering;
 
     /// Upper bound of the true depth of a point.
-    fn at_most(at: &Self::At) -> f64;
+    fn max_depth(at: &Self::Hit) -> f64;
 }
 
 #[cfg(test)]

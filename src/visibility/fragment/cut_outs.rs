@@ -8,7 +8,7 @@ use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, mix64};
 use crate::spec::values::choice;
 use crate::spec::{Spec, SpecError};
-use crate::visibility::truth::{Crossing, Probe};
+use crate::visibility::truth::{BoxHit, Probe};
 
 named! {
     /// Pattern of the opaque parts of a surface.
@@ -63,7 +63,7 @@ impl AlphaMasks {
     ///
     /// The position on the face is computed at the rounded depth, relative to the box's lower
     /// corner, along the face's two axes in the order x, y, z.
-    pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &Crossing) -> bool {
+    pub fn opaque(&self, item: ItemId, b: &WorldBox, probe: &Probe, at: &BoxHit) -> bool {
         let Some(Some(tiled)) = self.of_item.get(item as usize) else {
             return true;
         };

@@ -9,7 +9,7 @@ use super::cut_outs::AlphaMasks;
 use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::truth::{
-    Along, Body, Crossing, Facet, Meeting, Probe, SolidBox, TriangleProbe,
+    Body, BoxHit, Facet, Probe, RayProbe, SolidBox, TriangleHit, TriangleProbe,
 };
 
 /// Fragment tests in addition to the z-test.
@@ -27,7 +27,7 @@ pub trait Drawable: Body {
     fn rectangle(&self, canvas: &Canvas<Self>) -> Option<Rectangle>;
 
     /// Tests whether the body is opaque where a ray meets it.
-    fn is_opaque(&self, masks: &AlphaMasks, probe: &Self::Probe, at: &Self::At) -> bool;
+    fn is_opaque(&self, masks: &AlphaMasks, probe: &Self::Probe, at: &Self::Hit) -> bool;
 }
 
 impl Drawable for SolidBox {
@@ -35,7 +35,7 @@ impl Drawable for SolidBox {
         canvas.screen.rectangle(&self.b)
     }
 
-    fn is_opaque(&self, masks: &AlphaMasks, probe: &Probe, at: &Crossing) -> bool {
+    fn is_opaque(&self, masks: &AlphaMasks, probe: &Probe, at: &BoxHit) -> bool {
         masks.opaque(self.item, &self.b, probe, at)
     }
 }
@@ -45,7 +45,7 @@ impl Drawable for Facet {
         canvas.screen.triangle(self.corners, canvas.origin)
     }
 
-    fn is_opaque(&self, _: &AlphaMasks, _: &TriangleProbe, _: &Meeting) -> bool {
+    fn is_opaque(&self, _: &AlphaMasks, _: &TriangleProbe, _: &TriangleHit) -> bool {
         true
     }
 }
@@ -69,10 +69,10 @@ pub struct FragmentCounts<N = u64> {
 
 /// A body at a sample whose ray meets it.
 #[derive(Clone, Copy, Debug)]
-struct Fragment<At> {
+struct Fragment<Hit> {
     sample: usize,
     item: ItemId,
-    at: At,
+    at: Hit,
 }
 
 /// A drawn image, of boxes or of triangles.
@@ -81,9 +81,9 @@ pub struct Drawn<B: Body = SolidBox> {
     /// Counts of all that was drawn.
     pub counts: FragmentCounts,
     /// Nearest opaque item of each sample, exact; the lowest id of a tie.
-    pub(super) front: Vec<Option<(B::At, ItemId)>>,
+    pub(super) front: Vec<Option<(B::Hit, ItemId)>>,
     /// Fragments at the depth of the one in front whose id is higher.
-    ties: Vec<Fragment<B::At>>,
+    ties: Vec<Fragment<B::Hit>>,
     /// Items of triangles that hide nothing and lie before the front or at its depth.
     before: Vec<ItemId>,
 }
@@ -121,7 +121,7 @@ impl<B: Drawable> Drawn<B> {
             let item = body.item();
             let place = body.rectangle(canvas);
             let [tested, kept_out] = canvas.scan(place, tests.stencil, |sample, probe| {
-                let Some(at) = body.meet(probe, f64::INFINITY) else {
+                let Some(at) = body.hit(probe, f64::INFINITY) else {
                     return;
                 };
                 self.counts.fragment_count += 1;
@@ -130,7 +130,7 @@ impl<B: Drawable> Drawn<B> {
                     self.counts.clear_count += 1;
                     return;
                 }
-                let is_before = |(front, _): (B::At, _)| probe.compare(&at, &front).is_le();
+                let is_before = |(front, _): (B::Hit, _)| probe.compare(&at, &front).is_le();
                 let passes = match body.hides() {
                     true => self.test(probe, Fragment { sample, item, at }),
                     false => self.front[sample].is_none_or(is_before),
@@ -151,7 +151,7 @@ impl<B: Drawable> Drawn<B> {
     /// It passes if the sample is empty, or holds a deeper item, or an equally deep item of higher
     /// id.
     #[inline]
-    fn test(&mut self, probe: &B::Probe, fragment: Fragment<B::At>) -> bool {
+    fn test(&mut self, probe: &B::Probe, fragment: Fragment<B::Hit>) -> bool {
         let Fragment { sample, item, at } = fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
@@ -183,9 +183,9 @@ impl<B: Drawable> Drawn<B> {
     /// Contains the items in front at any sample, every item of a tie, and the items before them
     /// that hide nothing.
     pub fn visible(&self, canvas: &Canvas<B>) -> Vec<ItemId> {
-        let in_front = |tie: &&Fragment<B::At>| {
+        let in_front = |tie: &&Fragment<B::Hit>| {
             let front = self.front[tie.sample];
-            let order = |front: (B::At, _)| canvas.probes[tie.sample].compare(&tie.at, &front.0);
+            let order = |front: (B::Hit, _)| canvas.probes[tie.sample].compare(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
         };
         let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);
@@ -250,7 +250,7 @@ mod tests {
     impl<B: Body> Drawn<B> {
         /// The item in front at each sample, [`NO_ITEM`] for none.
         pub fn ids(&self) -> Vec<ItemId> {
-            let id = |front: &Option<(B::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
+            let id = |front: &Option<(B::Hit, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
             self.front.iter().map(id).collect()
         }
     }

@@ -9,7 +9,7 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::truth::{
-    Along, Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, fronts, judge,
+    Boxes, NO_ITEM, RayIndex, RayProbe, SampleTruth, SolidBox, fronts, judge,
 };
 use crate::visibility::{Rays, SampleGrid, Solids};
 
@@ -41,7 +41,7 @@ fn tallied(rays: &Rays, grid: SampleGrid, index: &RayIndex, order: &[ItemId]) ->
     let mut counts = FragmentCounts::default();
     for ray in rays.of_grid(grid) {
         let probe = index.probe(&ray);
-        let mut met = index.all_along(&ray);
+        let mut met = index.all_hits(&ray);
         met.sort_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
         met.dedup_by_key(|(item, _)| *item);
         met.sort_by_key(|(item, _)| place(*item));

@@ -5,14 +5,14 @@ use std::cmp::Ordering;
 use super::Pick;
 use crate::query::ItemId;
 use crate::visibility::Ray;
-use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
+use crate::visibility::truth::{Bodies, Body, BodyIndex, RayProbe, Visit};
 
 /// An item and the point where a ray meets it.
-type Hit<B> = (ItemId, <B as Body>::At);
+type ItemHit<B> = (ItemId, <B as Body>::Hit);
 
 /// Exact order by depth, then by id.
 #[inline]
-fn order<B: Body>(probe: &B::Probe, a: &Hit<B>, b: &Hit<B>) -> Ordering {
+fn order<B: Body>(probe: &B::Probe, a: &ItemHit<B>, b: &ItemHit<B>) -> Ordering {
     probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
 }
 
@@ -21,7 +21,7 @@ pub(super) struct NearestHit<B: Body> {
     probe: B::Probe,
     /// Upper bound of the depth of the nearest candidate.
     limit: f64,
-    best: Option<Hit<B>>,
+    best: Option<ItemHit<B>>,
 }
 
 impl<B: Body> NearestHit<B> {
@@ -39,7 +39,7 @@ impl<B: Body> NearestHit<B> {
     #[inline]
     pub fn item(&self, items: usize) -> Option<ItemId> {
         self.best
-            .map(|met| met.0)
+            .map(|hit| hit.0)
             .filter(|&item| (item as usize) < items)
     }
 }
@@ -47,12 +47,12 @@ impl<B: Body> NearestHit<B> {
 impl<B: Body> Visit<B> for NearestHit<B> {
     #[inline(always)]
     fn visit(&mut self, body: &B) -> f64 {
-        if let Some(at) = body.meet(&self.probe, self.limit) {
-            let met = (body.item(), at);
-            let is_first = |best: Hit<B>| order::<B>(&self.probe, &met, &best).is_lt();
+        if let Some(at) = body.hit(&self.probe, self.limit) {
+            let hit = (body.item(), at);
+            let is_first = |best: ItemHit<B>| order::<B>(&self.probe, &hit, &best).is_lt();
             if self.best.is_none_or(is_first) {
-                self.best = Some(met);
-                self.limit = self.limit.min(B::Probe::at_most(&at));
+                self.best = Some(hit);
+                self.limit = self.limit.min(B::Probe::max_depth(&at));
             }
         }
         self.limit
@@ -64,23 +64,23 @@ impl<B: Body> Visit<B> for NearestHit<B> {
 /// Includes all items at the depth of the last of them.
 pub(super) fn nearest<B: Body>(
     probe: &B::Probe,
-    mut met: Vec<Hit<B>>,
+    mut hits: Vec<ItemHit<B>>,
     count: usize,
     out: &mut Vec<ItemId>,
 ) {
     if !B::IS_BOX {
-        met.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.compare(&a.1, &b.1)));
-        met.dedup_by_key(|(item, _)| *item);
+        hits.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.compare(&a.1, &b.1)));
+        hits.dedup_by_key(|(item, _)| *item);
     }
-    met.sort_unstable_by(|a, b| order::<B>(probe, a, b));
-    match count.checked_sub(1).map(|last| met.get(last)) {
-        None => met.clear(),
+    hits.sort_unstable_by(|a, b| order::<B>(probe, a, b));
+    match count.checked_sub(1).map(|last| hits.get(last)) {
+        None => hits.clear(),
         Some(None) => {}
         Some(Some(&(_, last))) => {
-            met.truncate(met.partition_point(|(_, at)| probe.compare(at, &last).is_le()));
+            hits.truncate(hits.partition_point(|(_, at)| probe.compare(at, &last).is_le()));
         }
     }
-    out.extend(met.into_iter().map(|(item, _)| item));
+    out.extend(hits.into_iter().map(|(item, _)| item));
 }
 
 /// Reference of picking, over the same tree as the sample truth.
@@ -94,9 +94,9 @@ impl<B: Body> Pick for BodyIndex<B> {
     }
 
     fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
-        let mut met = self.all_along(ray);
-        met.retain(|(item, _)| (*item as usize) < self.items);
-        nearest::<B>(&self.probe(ray), met, count, out);
+        let mut hits = self.all_hits(ray);
+        hits.retain(|(item, _)| (*item as usize) < self.items);
+        nearest::<B>(&self.probe(ray), hits, count, out);
     }
 }
 
@@ -118,8 +118,8 @@ impl<B: Body> Pick for LinearScan<B> {
     fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
         let probe = B::probe(ray, self.0.origin);
         let counted = |body: &&B| (body.item() as usize) < self.0.items;
-        let met = self.0.all.iter().filter(counted);
-        let met = met.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
-        nearest::<B>(&probe, met.collect(), count, out);
+        let hits = self.0.all.iter().filter(counted);
+        let hits = hits.filter_map(|body| Some((body.item(), body.hit(&probe, ray.far)?)));
+        nearest::<B>(&probe, hits.collect(), count, out);
     }
 }

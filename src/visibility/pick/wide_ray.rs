@@ -7,7 +7,7 @@ use super::exact::{self, NearestHit};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::Ray;
-use crate::visibility::truth::{Along, Bodies, Body, BodyIndex, Visit};
+use crate::visibility::truth::{Bodies, Body, BodyIndex, RayProbe, Visit};
 
 /// Bodies of a scene, to be picked with an instruction set.
 #[derive(Clone, Debug)]
@@ -41,10 +41,10 @@ impl<B: Body> Pick for WideRay<B> {
             count,
             far: ray.far,
             lowest: Vec::new(),
-            met: Vec::new(),
+            hits: Vec::new(),
         };
         of.walk(ray, &mut found);
-        exact::nearest::<B>(&probe, found.met, count, out);
+        exact::nearest::<B>(&probe, found.hits, count, out);
     }
 }
 
@@ -56,7 +56,7 @@ struct Several<'a, B: Body> {
     far: f64,
     /// Lowest upper bounds of depths, with their items; at most `count`, sorted.
     lowest: Vec<(f64, ItemId)>,
-    met: Vec<(ItemId, B::At)>,
+    hits: Vec<(ItemId, B::Hit)>,
 }
 
 impl<B: Body> Several<'_, B> {
@@ -75,11 +75,11 @@ impl<B: Body> Visit<B> for Several<'_, B> {
         if item as usize >= self.items {
             return limit;
         }
-        let Some(at) = body.meet(self.probe, limit) else {
+        let Some(at) = body.hit(self.probe, limit) else {
             return limit;
         };
-        self.met.push((item, at));
-        let latest = B::Probe::at_most(&at);
+        self.hits.push((item, at));
+        let latest = B::Probe::max_depth(&at);
         if latest < limit {
             let lowest = &mut self.lowest;
             match lowest.iter().position(|of| of.1 == item) {

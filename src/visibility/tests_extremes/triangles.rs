@@ -147,8 +147,8 @@ impl Met {
 
     /// Clusters and bits of the triangles that some ray meets first.
     fn first(&self, rays: impl Iterator<Item = Ray>) -> Vec<(usize, u64)> {
-        let meetings = rays.filter_map(|ray| self.index.front_of(&ray).meeting);
-        let places = meetings.flat_map(|meeting| &self.places[&key(meeting.corners)]);
+        let hits = rays.filter_map(|ray| self.index.front_of(&ray).hit);
+        let places = hits.flat_map(|hit| &self.places[&key(hit.corners)]);
         places.copied().collect()
     }
 }

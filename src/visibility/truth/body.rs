@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use glam::{DVec3, Vec3};
 
-use super::super::rays::Along;
+use super::super::rays::RayProbe;
 use super::ray_box::Probe;
 use super::ray_triangle::TriangleProbe;
 use crate::geometry::Aabb;
@@ -15,9 +15,9 @@ use crate::visibility::{Ray, Solids};
 /// A body that rays meet.
 pub trait Body: Copy + Debug + Send + Sync + 'static {
     /// Ray prepared for bodies of this kind.
-    type Probe: Along<At = Self::At> + Debug;
+    type Probe: RayProbe<Hit = Self::Hit> + Debug;
     /// Point where a ray meets the surface of a body.
-    type At: Copy + Debug;
+    type Hit: Copy + Debug;
     /// `true` if an item is a single body that fills its bounding box.
     const IS_BOX: bool;
 
@@ -31,7 +31,7 @@ pub trait Body: Copy + Debug + Send + Sync + 'static {
     fn hides(&self) -> bool;
 
     /// Exact meeting from near to far; may be `None` if it lies beyond `limit`.
-    fn meet(&self, probe: &Self::Probe, limit: f64) -> Option<Self::At>;
+    fn hit(&self, probe: &Self::Probe, limit: f64) -> Option<Self::Hit>;
 }
 
 /// An item as a solid box.
@@ -59,7 +59,7 @@ impl SolidBox {
 
 impl Body for SolidBox {
     type Probe = Probe;
-    type At = <Probe as Along>::At;
+    type Hit = <Probe as RayProbe>::Hit;
     const IS_BOX: bool = true;
 
     #[inline(always)]
@@ -78,7 +78,7 @@ impl Body for SolidBox {
     }
 
     #[inline(always)]
-    fn meet(&self, probe: &Probe, limit: f64) -> Option<Self::At> {
+    fn hit(&self, probe: &Probe, limit: f64) -> Option<Self::Hit> {
         probe.enter(&self.b, limit)
     }
 }
@@ -112,7 +112,7 @@ impl Facet {
 
 impl Body for Facet {
     type Probe = TriangleProbe;
-    type At = <TriangleProbe as Along>::At;
+    type Hit = <TriangleProbe as RayProbe>::Hit;
     const IS_BOX: bool = false;
 
     #[inline(always)]
@@ -131,8 +131,8 @@ impl Body for Facet {
     }
 
     #[inline(always)]
-    fn meet(&self, probe: &TriangleProbe, limit: f64) -> Option<Self::At> {
-        probe.meet(self.corners, self.two_sided, limit)
+    fn hit(&self, probe: &TriangleProbe, limit: f64) -> Option<Self::Hit> {
+        probe.hit(self.corners, self.two_sided, limit)
     }
 }
 

@@ -17,11 +17,11 @@ use crate::query::ItemId;
 use crate::threads;
 use crate::visibility::{Rays, SampleGrid};
 
-pub use super::rays::Along;
+pub use super::rays::RayProbe;
 pub use body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
-pub use ray_box::{Crossing, Probe};
+pub use ray_box::{BoxHit, Probe};
 pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex, Visit};
-pub use ray_triangle::{Meeting, TriangleProbe};
+pub use ray_triangle::{TriangleHit, TriangleProbe};
 
 #[cfg(test)]
 pub(super) use tests::{NO_ITEM, fronts, judge, visible_by_random_rays};
@@ -45,7 +45,7 @@ impl SampleTruth {
     /// `None`, early, if the sum of `samples_of` would exceed `most`.
     pub fn of_opaque<B: Body>(
         index: &BodyIndex<B>,
-        is_opaque: &(impl Fn(&B, &B::Probe, &B::At) -> bool + Sync),
+        is_opaque: &(impl Fn(&B, &B::Probe, &B::Hit) -> bool + Sync),
         rays: &Rays,
         grid: SampleGrid,
         threads: usize,

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::super::rays::Along;
+use super::super::rays::RayProbe;
 use crate::arithmetic::Expansion;
 use crate::kernel::each;
 use crate::scene::WorldBox;
@@ -25,7 +25,7 @@ fn apart(a: f64, b: f64) -> bool {
 ///
 /// The true depth is the fraction `(plane - origin[axis]) / direction[axis]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Crossing {
+pub struct BoxHit {
     /// Depth in f64, accurate to 2^-50 of itself.
     pub depth: f64,
     /// Bound of the box that is crossed, in world coordinates.
@@ -45,11 +45,11 @@ pub struct Probe {
     inverse: [f64; 3],
 }
 
-impl Along for Probe {
-    type At = Crossing;
+impl RayProbe for Probe {
+    type Hit = BoxHit;
 
     #[inline]
-    fn compare(&self, a: &Crossing, b: &Crossing) -> Ordering {
+    fn compare(&self, a: &BoxHit, b: &BoxHit) -> Ordering {
         if a.axis == b.axis {
             let order = a.plane.total_cmp(&b.plane);
             let same = a.plane == b.plane;
@@ -67,7 +67,7 @@ impl Along for Probe {
     }
 
     #[inline(always)]
-    fn at_most(at: &Crossing) -> f64 {
+    fn max_depth(at: &BoxHit) -> f64 {
         at.depth + GUARD * at.depth.abs()
     }
 }
@@ -81,9 +81,9 @@ impl Probe {
     }
 
     #[inline(always)]
-    fn crossing(&self, axis: usize, plane: f64) -> Crossing {
+    fn crossing(&self, axis: usize, plane: f64) -> BoxHit {
         let depth = (plane - self.ray.origin[axis]) * self.inverse[axis];
-        Crossing { depth, plane, axis }
+        BoxHit { depth, plane, axis }
     }
 
     /// Entry of the ray into the closed box, if that is from near to far.
@@ -91,7 +91,7 @@ impl Probe {
     /// This is the truth of [`Solids`](crate::visibility::Solids). Also `None` if the ray certainly
     /// enters beyond `limit`.
     #[inline]
-    pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<Crossing> {
+    pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<BoxHit> {
         let ray = &self.ray;
         let (mut entries, mut exits) = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
         let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -164,7 +164,7 @@ impl Probe {
 
     /// Last entry into the slabs of a box, exact; `None` for a zero direction.
     #[cold]
-    fn latest_entry(&self, b: &WorldBox) -> Option<Crossing> {
+    fn latest_entry(&self, b: &WorldBox) -> Option<BoxHit> {
         let entry = |axis| self.crossing(axis, self.entered(b, axis));
         self.crossed()
             .map(entry)
@@ -173,7 +173,7 @@ impl Probe {
 
     /// Returns `true` if the ray leaves a slab before it enters the last one.
     #[cold]
-    fn leaves_before(&self, b: &WorldBox, enters: &Crossing) -> bool {
+    fn leaves_before(&self, b: &WorldBox, enters: &BoxHit) -> bool {
         let mirrored = WorldBox::new(b.max, b.min);
         self.crossed().any(|axis| {
             let left = self.crossing(axis, self.entered(&mirrored, axis));
@@ -183,7 +183,7 @@ impl Probe {
 
     /// Compares `N_a / d_a` with `N_b / d_b`, both multiplied by `d_a d_b`.
     #[cold]
-    fn compare_exactly(&self, a: &Crossing, b: &Crossing) -> Ordering {
+    fn compare_exactly(&self, a: &BoxHit, b: &BoxHit) -> Ordering {
         let direction = &self.ray.direction;
         let (da, db) = (direction[a.axis], direction[b.axis]);
         let left = &self.numerator(a) * &Expansion::from(db);
@@ -197,7 +197,7 @@ impl Probe {
     }
 
     /// Compares a crossing with a depth, exactly.
-    fn compare_with(&self, a: &Crossing, depth: f64) -> Ordering {
+    fn compare_with(&self, a: &BoxHit, depth: f64) -> Ordering {
         if depth.is_infinite() {
             return 0.0_f64.total_cmp(&depth);
         }
@@ -208,7 +208,7 @@ impl Probe {
     }
 
     /// Computes `plane - origin` exactly.
-    fn numerator(&self, a: &Crossing) -> Expansion {
+    fn numerator(&self, a: &BoxHit) -> Expansion {
         Expansion::sum([a.plane, -self.ray.origin[a.axis]])
     }
 }

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::super::rays::Along;
+use super::super::rays::RayProbe;
 use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 use super::ray_tree::{RayTree, misses};
 use super::slabs::{RaySlabTest, round_up};
@@ -37,9 +37,9 @@ pub type SurfaceIndex = BodyIndex<Facet>;
 
 /// Items visible along a ray; its memory is reused from ray to ray.
 #[derive(Clone, Debug)]
-pub struct Front<At> {
+pub struct Front<Hit> {
     /// Meetings with bodies that hide nothing.
-    transparent: Vec<(ItemId, At)>,
+    transparent: Vec<(ItemId, Hit)>,
     /// Hiding items that the ray meets first, ascending.
     ///
     /// More than one is a tie. Empty if the ray meets none from near to far.
@@ -49,7 +49,7 @@ pub struct Front<At> {
     /// The ray meets one of their triangles that hide nothing.
     pub before: Vec<ItemId>,
     /// Point where the ray meets the front items.
-    pub meeting: Option<At>,
+    pub hit: Option<Hit>,
 }
 
 impl RayIndex {
@@ -95,7 +95,7 @@ impl<B: Body> BodyIndex<B> {
     }
 
     /// Finds the items visible along a ray, exactly.
-    pub fn front_of(&self, ray: &Ray) -> Front<B::At> {
+    pub fn front_of(&self, ray: &Ray) -> Front<B::Hit> {
         let mut front = Front::new();
         front.search(self, ray, &|_, _, _| true);
         front
@@ -105,8 +105,8 @@ impl<B: Body> BodyIndex<B> {
     pub fn min_body_tests(&self, rays: &Rays, grid: SampleGrid) -> u64 {
         let mut tests = 0;
         for ray in rays.of_grid(grid) {
-            let meeting = self.front_of(&ray).meeting;
-            let end = meeting.map_or(ray.far, |at| B::Probe::at_most(&at));
+            let hit = self.front_of(&ray).hit;
+            let end = hit.map_or(ray.far, |at| B::Probe::max_depth(&at));
             self.walk(&ray, &mut |_: &B| {
                 tests += 1;
                 end
@@ -116,16 +116,16 @@ impl<B: Body> BodyIndex<B> {
     }
 
     /// All meetings of a ray with hiding bodies from near to far, unordered.
-    pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, B::At)> {
+    pub fn all_hits(&self, ray: &Ray) -> Vec<(ItemId, B::Hit)> {
         let probe = self.probe(ray);
-        let mut met = Vec::new();
+        let mut hits = Vec::new();
         self.walk(ray, &mut |body: &B| {
             if body.hides() {
-                met.extend(body.meet(&probe, ray.far).map(|at| (body.item(), at)));
+                hits.extend(body.hit(&probe, ray.far).map(|at| (body.item(), at)));
             }
             ray.far
         });
-        met
+        hits
     }
 }
 
@@ -168,13 +168,13 @@ impl<B: Body, V: Visit<B>> Work for Traversal<'_, B, V> {
     }
 }
 
-impl<At: Copy> Front<At> {
-    pub(super) fn new() -> Front<At> {
+impl<Hit: Copy> Front<Hit> {
+    pub(super) fn new() -> Front<Hit> {
         Front {
             transparent: Vec::new(),
             front: Vec::new(),
             before: Vec::new(),
-            meeting: None,
+            hit: None,
         }
     }
 
@@ -182,20 +182,20 @@ impl<At: Copy> Front<At> {
     ///
     /// The ray passes through a point of a hiding body that is not `is_opaque`.
     #[inline]
-    pub(super) fn search<B: Body<At = At>>(
+    pub(super) fn search<B: Body<Hit = Hit>>(
         &mut self,
         index: &BodyIndex<B>,
         ray: &Ray,
-        is_opaque: &impl Fn(&B, &B::Probe, &At) -> bool,
+        is_opaque: &impl Fn(&B, &B::Probe, &Hit) -> bool,
     ) {
         let probe = index.probe(ray);
         let (front, transparent) = (&mut self.front, &mut self.transparent);
         front.clear();
         transparent.clear();
-        let mut best: Option<At> = None;
+        let mut best: Option<Hit> = None;
         let mut limit = ray.far;
         index.walk(ray, &mut |body: &B| {
-            let Some(at) = body.meet(&probe, limit) else {
+            let Some(at) = body.hit(&probe, limit) else {
                 return limit;
             };
             if !body.hides() {
@@ -208,14 +208,14 @@ impl<At: Copy> Front<At> {
                 Ordering::Less => {
                     front.clear();
                     best = Some(at);
-                    limit = limit.min(B::Probe::at_most(&at));
+                    limit = limit.min(B::Probe::max_depth(&at));
                 }
                 Ordering::Equal => {}
             }
             front.push(body.item());
             limit
         });
-        let reached = |at: &At| best.is_none_or(|best| probe.compare(at, &best).is_le());
+        let reached = |at: &Hit| best.is_none_or(|best| probe.compare(at, &best).is_le());
         self.before.clear();
         let before = transparent.iter().filter(|(_, at)| reached(at));
         self.before.extend(before.map(|(item, _)| *item));
@@ -224,6 +224,6 @@ impl<At: Copy> Front<At> {
             items.dedup();
         }
         self.before.retain(|item| !self.front.contains(item));
-        self.meeting = best;
+        self.hit = best;
     }
 }

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use glam::{DVec3, I64Vec3, Vec3};
 
-use super::super::rays::Along;
+use super::super::rays::RayProbe;
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
@@ -38,7 +38,7 @@ const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 
 /// Meeting of a ray and a triangle.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Meeting {
+pub struct TriangleHit {
     /// Depth in f64; 0 where f64 does not determine it.
     pub depth: f64,
     /// Bound of the error of `depth`; may be infinite.
@@ -47,10 +47,10 @@ pub struct Meeting {
     pub corners: [Vec3; 3],
 }
 
-impl Meeting {
+impl TriangleHit {
     /// Lower bound of the depth at which the ray meets the triangle.
     #[inline]
-    pub fn at_least(&self) -> f64 {
+    pub fn min_depth(&self) -> f64 {
         self.depth - self.error
     }
 }
@@ -71,15 +71,15 @@ pub struct TriangleProbe {
     far: f64,
 }
 
-impl Along for TriangleProbe {
-    type At = Meeting;
+impl RayProbe for TriangleProbe {
+    type Hit = TriangleHit;
 
     #[inline]
-    fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
-        if Self::at_most(a) < b.at_least() {
+    fn compare(&self, a: &TriangleHit, b: &TriangleHit) -> Ordering {
+        if Self::max_depth(a) < b.min_depth() {
             return Ordering::Less;
         }
-        if Self::at_most(b) < a.at_least() {
+        if Self::max_depth(b) < a.min_depth() {
             return Ordering::Greater;
         }
         // Walls of two sides have two triangles in one plane, which the ray meets once.
@@ -90,7 +90,7 @@ impl Along for TriangleProbe {
     }
 
     #[inline(always)]
-    fn at_most(at: &Meeting) -> f64 {
+    fn max_depth(at: &TriangleHit) -> f64 {
         at.depth + at.error
     }
 }
@@ -115,7 +115,7 @@ impl TriangleProbe {
     /// A one-sided triangle is met from its front only, where its corners turn counter-clockwise.
     /// Also `None` if the ray certainly meets it beyond `limit`.
     #[inline(always)]
-    pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
+    pub fn hit(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<TriangleHit> {
         let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
         let direction = self.ray.direction;
         let (u, v, at) = (b - a, c - a, a + self.shift);
@@ -150,27 +150,26 @@ impl TriangleProbe {
             error = 2.0 * (along_off + depth.abs() * towards_off) / towards.abs()
                 + 4.0 * UNIT * depth.abs();
         }
-        let meeting = Meeting {
+        let hit = TriangleHit {
             depth,
             error,
             corners,
         };
         let (near, far) = (self.ray.near, self.ray.far);
-        if meeting.at_least() > limit || meeting.at_least() > far || Self::at_most(&meeting) < near
-        {
+        if hit.min_depth() > limit || hit.min_depth() > far || Self::max_depth(&hit) < near {
             return None;
         }
-        if meeting.at_least() < near && self.compare_with(&meeting, near).is_lt() {
+        if hit.min_depth() < near && self.compare_with(&hit, near).is_lt() {
             return None;
         }
-        if Self::at_most(&meeting) > far && self.compare_with(&meeting, far).is_gt() {
+        if Self::max_depth(&hit) > far && self.compare_with(&hit, far).is_gt() {
             return None;
         }
-        Some(meeting)
+        Some(hit)
     }
 
     #[cold]
-    fn compare_exactly(&self, a: &Meeting, b: &Meeting) -> Ordering {
+    fn compare_exactly(&self, a: &TriangleHit, b: &TriangleHit) -> Ordering {
         let (above_a, below_a) = self.fraction(a.corners);
         let (above_b, below_b) = self.fraction(b.corners);
         let difference = &(&above_a * &below_b) - &(&above_b * &below_a);
@@ -179,7 +178,7 @@ impl TriangleProbe {
 
     /// Compares a meeting with a depth, exactly.
     #[cold]
-    fn compare_with(&self, a: &Meeting, depth: f64) -> Ordering {
+    fn compare_with(&self, a: &TriangleHit, depth: f64) -> Ordering {
         if depth.is_infinite() {
             return 0.0_f64.total_cmp(&depth);
         }
@@ -284,14 +283,14 @@ mod tests {
         let (below, above) = (1.0 / 3.0, (1.0_f64 / 3.0).next_up());
         let met = |near, far| {
             let probe = TriangleProbe::new(ray(near, far), DVec3::ZERO);
-            probe.meet(ACROSS, false, f64::INFINITY).is_some()
+            probe.hit(ACROSS, false, f64::INFINITY).is_some()
         };
         assert!(met(below, f64::INFINITY) && !met(above, f64::INFINITY));
         assert!(met(0.0, above) && !met(0.0, below));
         // A depth that is a double is met even if near and far equal it.
         let twice = ACROSS.map(|p| p * 1.5);
         let probe = TriangleProbe::new(ray(0.5, 0.5), DVec3::ZERO);
-        assert!(probe.meet(twice, false, f64::INFINITY).is_some());
+        assert!(probe.hit(twice, false, f64::INFINITY).is_some());
     }
 
     #[test]
@@ -310,7 +309,7 @@ mod tests {
                 // The smaller triangle is beyond what f64 decides.
                 for size in [1.0, 2f32.powi(-70)] {
                     let corners = corners.map(|p| (p - off) * Vec3::new(1.0, size, size));
-                    let found = probe.meet(corners, two_sided, f64::INFINITY);
+                    let found = probe.hit(corners, two_sided, f64::INFINITY);
                     assert_eq!(found.is_some(), met, "{corners:?}");
                 }
             }
@@ -336,7 +335,7 @@ mod tests {
                 far: f64::INFINITY,
             };
             let probe = TriangleProbe::new(ray, DVec3::ZERO);
-            let found = probe.meet(corners, false, f64::INFINITY).is_some();
+            let found = probe.hit(corners, false, f64::INFINITY).is_some();
             assert_eq!(found, probe.pierces(corners, false), "{ray:?} {corners:?}");
             met += u32::from(found);
             passed_by += u32::from(!found);

@@ -31,7 +31,7 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         assert_eq!(ids, fronts(&index, &opaque, &rays, GRID));
         for (sample, &id) in ids.iter().enumerate() {
             let probe = &canvas.probes[sample];
-            let mut along = index.all_along(&probe.ray);
+            let mut along = index.all_hits(&probe.ray);
             along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
             let opaque =
                 |item: ItemId, at| surfaces.opaque(item, &solids.boxes[item as usize], probe, at);

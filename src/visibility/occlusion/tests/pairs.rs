@@ -11,7 +11,7 @@ use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
-use crate::visibility::truth::{Along, Probe};
+use crate::visibility::truth::{Probe, RayProbe};
 use crate::visibility::{Ray, SampleGrid};
 
 const GRID: SampleGrid = SampleGrid::new(64, 40);

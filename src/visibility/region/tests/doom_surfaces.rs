@@ -131,7 +131,7 @@ fn rays_end_where_rays_through_sectors_end() {
                 follow::sectors(&world.map, &world.graph, &ray, &mut whole);
                 let (mut all, mut until) = (Vec::new(), Vec::new());
                 whole.list(&mut all);
-                let Some(meeting) = sight.meeting else {
+                let Some(hit) = sight.hit else {
                     escaped += 1;
                     continue;
                 };
@@ -142,7 +142,7 @@ fn rays_end_where_rays_through_sectors_end() {
                 };
                 assert!(all.iter().any(near), "{name} {ray:?}: {front} in {all:?}");
                 let shorter = crate::visibility::Ray {
-                    far: meeting.depth * (1.0 - 1e-9),
+                    far: hit.depth * (1.0 - 1e-9),
                     ..ray
                 };
                 part.clear(world.graph.len());

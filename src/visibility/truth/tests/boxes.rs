@@ -56,7 +56,7 @@ fn everything_along_a_ray_is_what_whole_numbers_find() {
             rng.below(4) as u32,
             rng.below(4) as u32,
         );
-        let mut found: Vec<ItemId> = index.all_along(&ray).iter().map(|f| f.0).collect();
+        let mut found: Vec<ItemId> = index.all_hits(&ray).iter().map(|f| f.0).collect();
         found.sort_unstable();
         let wanted = (0..20).filter(|&item| judge::entry(&ray, &boxes[item as usize]).is_some());
         assert_eq!(found, wanted.collect::<Vec<_>>());

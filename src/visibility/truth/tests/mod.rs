@@ -31,7 +31,7 @@ pub const NO_ITEM: ItemId = ItemId::MAX;
 /// The lowest id of a tie, [`NO_ITEM`] if there is none.
 pub fn fronts<B: Body>(
     index: &BodyIndex<B>,
-    is_opaque: &impl Fn(&B, &B::Probe, &B::At) -> bool,
+    is_opaque: &impl Fn(&B, &B::Probe, &B::Hit) -> bool,
     rays: &Rays,
     grid: SampleGrid,
 ) -> Vec<ItemId> {

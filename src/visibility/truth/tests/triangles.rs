@@ -174,7 +174,7 @@ fn no_ray_slips_through_the_edges_of_a_closed_surface() {
             if outward.dot(ray.direction) < -0.3 * outward.length() * ray.direction.length() {
                 let front = index.front_of(&ray);
                 assert_eq!(front.front, [0], "{t} {at}");
-                assert!(front.meeting.unwrap().at_least() <= 1.0 + 1e-9);
+                assert!(front.hit.unwrap().min_depth() <= 1.0 + 1e-9);
                 met += 1;
             }
         }
