@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::case::{AdviseInput, spec_of, subset};
 use super::choice::{fastest, time_over};
-use super::trials::is_longer;
+use super::tasks::is_longer;
 use crate::culling::{Culling, CullingTest};
 use crate::measure::{
     Group, GroupPlan, Known, Part, ProcessTimes, ReportCell, SceneInfo, Subject, Workload, measure,

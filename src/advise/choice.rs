@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::case::{AdviseInput, SCAN, TREE};
-use super::trials::{CheckedAnswers, Trials, is_longer, of_costs};
+use super::tasks::{CheckedAnswers, TaskList, is_longer, of_costs};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, UpdatePolicy};
@@ -178,13 +178,13 @@ pub struct TestRow {
 }
 
 /// Adds tasks for all culling tests, except if a camera has no such view.
-pub(super) fn enter_tests(trials: &mut Trials) -> Result<Vec<(CullingTest, usize)>, BuildError> {
+pub(super) fn add_tests(tasks: &mut TaskList) -> Result<Vec<(CullingTest, usize)>, BuildError> {
     let mut entered = Vec::with_capacity(TESTS.len());
     for (test, ..) in TESTS {
         let culling = Culling::new(test, Arithmetic::F32, PlaneOptions::default());
-        if let Ok(views) = trials.case.views_by(&culling) {
-            let index = trials.case.tree_for(test)?;
-            entered.push((test, trials.index(index, views)));
+        if let Ok(views) = tasks.case.views_by(&culling) {
+            let index = tasks.case.tree_for(test)?;
+            entered.push((test, tasks.add_queries(index, views)));
         }
     }
     Ok(entered)

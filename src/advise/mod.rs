@@ -8,7 +8,7 @@ mod choice;
 mod planes;
 mod rule;
 mod rules;
-mod trials;
+mod tasks;
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub use case::AdviseInput;
 pub use change::{Axis, ExtraWorkloads};
 pub use choice::{MotionChoice, StructureChoice, TestChoice, TestRow, ns, policy_of};
 pub use rule::{Advice, Omission};
-pub use trials::{PairResult, TaskResult};
+pub use tasks::{PairResult, TaskResult};
 
 use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
@@ -29,11 +29,11 @@ use crate::motion::Motion;
 use case::Case;
 use rule::{EnteredRule, Finding, Rule};
 use rules::{RULES, input as stages};
-use trials::{BASE, CheckedAnswers, Trials};
+use tasks::{BASE, CheckedAnswers, TaskList};
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct TrialPlan {
+pub struct AdvicePlan {
     /// Tree and scan of the rules.
     structures: [String; 2],
     schedule: Schedule,
@@ -47,7 +47,7 @@ pub struct TrialPlan {
 /// Advice whose answers are compared, but which is not timed.
 pub struct UntimedAdvice {
     /// Tasks and schedule for all processes.
-    pub plan: TrialPlan,
+    pub plan: AdvicePlan,
     entered: RuleTasks,
     answered: CheckedAnswers,
     /// Counts of the additional workloads.
@@ -82,15 +82,15 @@ pub fn prepare(
     let labels = (contenders, rebuilt.flatten());
     let (beside, counted) = ExtraWorkloads::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
-    let mut trials = Trials::new(&case);
-    let entered = enter(&mut trials, progress)?;
+    let mut list = TaskList::new(&case);
+    let entered = add_all(&mut list, progress)?;
     progress("answers, checked");
-    let answered = trials.answered();
-    let tasks = trials.tasks(&answered.answers);
+    let answered = list.check();
+    let tasks = list.tasks(&answered.answers);
     let funnel = funnel::prepare(&stages(input.setting, &case.spec), progress);
     let funnel = funnel.map_err(|error| error.to_string());
     Ok(UntimedAdvice {
-        plan: TrialPlan {
+        plan: AdvicePlan {
             structures,
             schedule: Schedule::new(path.cameras.len(), &tasks, &input.setting.protocol),
             expected: answered.answers.clone(),
@@ -110,13 +110,13 @@ pub fn prepare(
 ///
 /// # Errors
 /// The errors of [`prepare`], and a scene other than the planned one.
-pub fn time(input: &AdviseInput, plan: &TrialPlan) -> Result<ProcessTimes> {
+pub fn time(input: &AdviseInput, plan: &AdvicePlan) -> Result<ProcessTimes> {
     let protocol = &input.setting.protocol;
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
-    let mut trials = Trials::new(&case);
-    enter(&mut trials, &|_| ())?;
-    let tasks = trials.tasks(&plan.expected);
+    let mut list = TaskList::new(&case);
+    add_all(&mut list, &|_| ())?;
+    let tasks = list.tasks(&plan.expected);
     let mut times = ProcessTimes {
         parts: plan.beside.times(input)?,
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
@@ -179,18 +179,18 @@ struct RuleTasks {
     twin: usize,
 }
 
-fn enter(trials: &mut Trials, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
+fn add_all(list: &mut TaskList, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
         // A rule whose tasks cannot be added does not apply.
-        let entered = (rule.enter)(trials);
+        let entered = (rule.add_tasks)(list);
         let none = |error: anyhow::Error| EnteredRule::new(None, Finding::none(error.to_string()));
         rules.push((rule, entered.unwrap_or_else(none)));
     }
     Ok(RuleTasks {
-        tests: choice::enter_tests(trials)?,
-        twin: trials.add_base(),
+        tests: choice::add_tests(list)?,
+        twin: list.add_base(),
         rules,
     })
 }

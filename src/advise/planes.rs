@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::case::{NO_NODES, TOLERANCE, subset};
 use super::choice::TestChoice;
 use super::rule::{EnteredRule, Finding};
-use super::trials::{BASE, TaskPair, Trials};
+use super::tasks::{BASE, TaskList, TaskPair};
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
@@ -24,8 +24,8 @@ const MAX_NEEDED: f64 = 0.99;
 /// Rule: planes with the whole scene on their inner side are not needed.
 ///
 /// Mostly far planes, which paths often put behind the scene.
-pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+pub fn needless_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let bounds = &case.workload.scene.bounds;
     let (mut needed, mut all) = (0, 0);
     let mut fewer = Vec::with_capacity(case.workload.views.len());
@@ -40,7 +40,7 @@ pub fn needless_planes(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let reason = format!("scene is inside {inside} of {planes}");
     // Two sides with the same planes would only differ by noise.
     let sides = (inside > 0).then(|| {
-        let left_out = trials.index(&*case.index, fewer);
+        let left_out = tasks.add_queries(&*case.index, fewer);
         TaskPair::new(&case.spec.label, BASE, left_out)
     });
     let finding = Finding::new(share, MAX_NEEDED, reason);
@@ -68,8 +68,8 @@ const COUNTED_CAMERAS: usize = 64;
 /// Rule: plane masks, which skip planes that contain a node in its subtree.
 ///
 /// The side without masks is a view that leaves all planes open unless all are closed.
-pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+pub fn plane_masks(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let kernel = case.spec.execution.kernel;
     let input = Input::new(&case.workload.scene.items);
     let tree = Rc::new(Wide::build(&input, &Default::default())?);
@@ -87,8 +87,8 @@ pub fn plane_masks(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
         finding = Finding::new(1.0 - fewer as f64 / all as f64, MIN_SAVED, reason);
     }
     let (other, views) = (tree.clone(), volumes.clone());
-    let kept = trials.enter(true, move |n, out| query(kernel, &tree, &volumes[n], out));
-    let left_out = trials.enter(true, move |n, out| {
+    let kept = tasks.add(true, move |n, out| query(kernel, &tree, &volumes[n], out));
+    let left_out = tasks.add(true, move |n, out| {
         query(kernel, &other, &Unmasked(&views[n]), out)
     });
     let sides = TaskPair::new(Wide::INFO.name, kept, left_out);
@@ -146,9 +146,9 @@ impl QueryVolume for Unmasked<'_> {
 /// Rule: axes beyond the six planes, from the volume's own box and silhouettes.
 ///
 /// The exact test adds them. They cost test time and save the drawing of false positives.
-pub fn six_planes(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
+pub fn six_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
-    let sides = against_base(trials, &exact)?;
+    let sides = against_base(tasks, &exact)?;
     Ok(EnteredRule::concluded(sides, move |advice, check| {
         let sides = check.map(|check| [&check.kept, &check.left_out]);
         let more = sides.and_then(|[exact, six]| {
@@ -184,10 +184,10 @@ fn with_choice(mut finding: Finding, choice: &TestChoice) -> Finding {
 }
 
 /// Compares the tree with another culling's views and the tree with default views.
-fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<TaskPair> {
-    let case = trials.case;
+fn against_base(tasks: &mut TaskList, culling: &Culling) -> anyhow::Result<TaskPair> {
+    let case = tasks.case;
     let views = case.views_by(culling)?;
-    let kept = trials.index(case.tree_for(culling.test)?, views);
+    let kept = tasks.add_queries(case.tree_for(culling.test)?, views);
     Ok(TaskPair::new(&case.spec.label, kept, BASE))
 }
 
@@ -195,12 +195,12 @@ fn against_base(trials: &mut Trials, culling: &Culling) -> anyhow::Result<TaskPa
 ///
 /// f32 planes, moved outward for their rounding, miss nothing either, and their margin is usually
 /// far too thin to contain an item.
-pub fn f64_kernel(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+pub fn f64_kernel(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
     let finding = of_margin(case.margin(&case.workload.around));
-    Ok(EnteredRule::new(against_base(trials, &in_f64)?, finding))
+    Ok(EnteredRule::new(against_base(tasks, &in_f64)?, finding))
 }
 
 fn of_margin(margin: f64) -> Finding {
@@ -215,8 +215,8 @@ fn of_margin(margin: f64) -> Finding {
 ///
 /// Near the world's origin f32 has enough digits without. One side has the scene about its centre,
 /// the other about the world's origin.
-pub fn rebasing(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+pub fn rebasing(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let scene = case.workload.scene;
     if case.workload.around != scene.surroundings() {
         bail!("a motion that leaves the scene");
@@ -236,7 +236,7 @@ pub fn rebasing(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     if margin > TOLERANCE && better > margin / 2.0 {
         bail!("about no origin are coordinates much smaller");
     }
-    let there = trials.index(case.spec.build(&other.items)?, views);
+    let there = tasks.add_queries(case.spec.build(&other.items)?, views);
     let [kept, left_out] = [[there, BASE], [BASE, there]][usize::from(is_moved)];
     let sides = TaskPair::new(&case.spec.label, kept, left_out);
     Ok(EnteredRule::new(sides, of_margin(margin)))
@@ -245,7 +245,7 @@ pub fn rebasing(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
 #[cfg(test)]
 mod tests {
     use super::super::rule::some_rule;
-    use super::super::trials::{Basis, Decision};
+    use super::super::tasks::{Basis, Decision};
     use super::*;
     use crate::geometry::Plane;
     use glam::Vec3;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::change::Change;
 use super::choice::{MotionChoice, StructureChoice, TestChoice};
-use super::trials::{Basis, Decision, PairResult, TaskPair, Trials, is_longer, of_costs};
+use super::tasks::{Basis, Decision, PairResult, TaskList, TaskPair, is_longer, of_costs};
 use crate::funnel::FunnelReport;
 use crate::statistics::Estimate;
 
@@ -26,7 +26,7 @@ pub struct Rule {
     pub(super) basis: Basis,
     /// Adds the tasks of both sides.
     #[serde(skip)]
-    pub(super) enter: for<'c> fn(&mut Trials<'c>) -> anyhow::Result<EnteredRule>,
+    pub(super) add_tasks: for<'c> fn(&mut TaskList<'c>) -> anyhow::Result<EnteredRule>,
 }
 
 /// Structure, test and features to leave out, with the evidence.
@@ -234,7 +234,7 @@ mod tests {
             left_out: "something",
             statistic_name: "its size",
             basis,
-            enter: |_| Ok(EnteredRule::new(None, Finding::default())),
+            add_tasks: |_| Ok(EnteredRule::new(None, Finding::default())),
         }))
     }
 }

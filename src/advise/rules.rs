@@ -11,8 +11,8 @@ use super::change::Axis;
 use super::choice::{ns, over, policy_of};
 use super::planes;
 use super::rule::{EnteredRule, Finding, Rule};
-use super::trials::Basis::{Error, Rule as Statistic, Time};
-use super::trials::{BASE, PairResult, TaskPair, Trials};
+use super::tasks::Basis::{Error, Rule as Statistic, Time};
+use super::tasks::{BASE, PairResult, TaskList, TaskPair};
 use crate::drift::walk;
 use crate::funnel::StageKind::{self, Occlusion, Region, Triangle};
 use crate::funnel::{Chain, FunnelInput, FunnelReport, Gain, NONE};
@@ -23,7 +23,7 @@ use crate::visibility::SampleGrid;
 
 /// All rules: name, work to leave out; statistic; decision.
 pub(super) const RULES: &[Rule] = rows! {
-    Rule { name, left_out, statistic_name, basis, enter }
+    Rule { name, left_out, statistic_name, basis, add_tasks }
     "needless-planes", "all six planes",
         "share of all planes that the n-vertex of the scene's bounds is not inside of",
         Time, planes::needless_planes;
@@ -54,11 +54,11 @@ pub(super) const RULES: &[Rule] = rows! {
 /// Rule: the index itself; below some number of items a scan is as fast.
 ///
 /// The number follows from measurements on parts of the scene ([`Axis::Items`]).
-fn no_index(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+fn no_index(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
     let items = &case.workload.scene.items;
-    let whole = trials.index(case.scan.build(items)?, &case.workload.views[..]);
+    let whole = tasks.add_queries(case.scan.build(items)?, &case.workload.views[..]);
     let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
     let sides = TaskPair::new(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
@@ -105,8 +105,8 @@ fn no_index(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
 ///
 /// An octree's third split separates nothing in a scene that is flatter than a quadtree's leaves
 /// are wide. Bounds stay three-dimensional either way.
-fn third_dimension(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let case = trials.case;
+fn third_dimension(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let case = tasks.case;
     let (scene, execution) = (case.workload.scene, case.spec.execution);
     let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, execution));
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
@@ -116,7 +116,7 @@ fn third_dimension(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
     let [height, widths @ ..] = extents;
     let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
-        .map(|index| trials.index(index, &case.workload.views[..]));
+        .map(|index| tasks.add_queries(index, &case.workload.views[..]));
     let sides = TaskPair::new("octree against quadtree", kept, left_out);
     Ok(EnteredRule::concluded(sides, move |advice, _| {
         if advice.structure.is_scan() {
@@ -172,12 +172,12 @@ fn rebuild() -> anyhow::Result<EnteredRule> {
 /// Axes in f32 that are rotated and never corrected drift by some 5e-8 per step; a walk of as many
 /// steps as the path has cameras measures the error. A basis that is built for each camera
 /// does not need the correction.
-fn frame_correction(trials: &mut Trials) -> anyhow::Result<EnteredRule> {
-    let path = trials.case.path;
+fn frame_correction(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
+    let path = tasks.case.path;
     let steps = path.cameras.len() + path.left_out;
     let [(error, without), (_, with)] =
         ["f32", "f32-polar-100"].map(|method| walk(method, steps as u64));
-    let [kept, left_out] = [with, without].map(|ask| trials.enter(false, ask));
+    let [kept, left_out] = [with, without].map(|ask| tasks.add(false, ask));
     // The error of a basis that is lost is infinite.
     let error = error.unwrap_or(f64::INFINITY);
     let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
@@ -263,7 +263,7 @@ fn gain_finding(gain: &Gain, one: &str, cost_ns: f64) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::super::rule::{Omission, some_rule};
-    use super::super::trials::{Basis, Decision};
+    use super::super::tasks::{Basis, Decision};
     use super::*;
     use crate::statistics::Estimate;
 

@@ -12,7 +12,7 @@ use super::visible_items::Errors;
 use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
 use crate::statistics::{ALPHA, Estimate, centre, flat, ratio, trimmed_mean};
-use crate::visibility::Level;
+use crate::visibility::MapSelection;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::occluders::{BlockStats, GroundStats, InnerBoxStats};
 
@@ -36,7 +36,7 @@ pub struct FunnelReport {
     /// Number of timed processes.
     pub processes: usize,
     /// The selected level of the scene's file.
-    pub level: Level,
+    pub level: MapSelection,
     /// Items that have holes; null unless requested.
     pub cut_outs: Option<CutOutRow>,
     /// Measured chain; [`FunnelReport::stages`] vary one of its stages at a time.

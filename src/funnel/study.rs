@@ -17,7 +17,7 @@ use super::visible_items::{Errors, VisibleItems, visible};
 use crate::input::{InputError, warn};
 use crate::measure::{ProcessTimes, Setting, Verdict};
 use crate::scene::memory::{available_bytes, fits_into};
-use crate::visibility::{Level, SampleGrid};
+use crate::visibility::{MapSelection, SampleGrid};
 
 /// Bytes per sample of a view: rays, depths and ties of two images.
 ///
@@ -197,7 +197,7 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunne
         cameras: path.cameras.len(),
         samples: [input.samples.width, input.samples.height],
         processes: 0,
-        level: Level::of(&scene.name, scene, &input.loading)?,
+        level: MapSelection::of(&scene.name, scene, &input.loading)?,
         cut_outs: cut_outs.map(|(typed, made)| CutOutRow {
             typed: *typed,
             item_count: made.of_item.iter().flatten().count(),

@@ -6,7 +6,7 @@
 
 pub mod fragment;
 pub mod inner_boxes;
-mod level;
+mod map_selection;
 pub mod occluders;
 pub mod occlusion;
 pub mod pick;
@@ -18,7 +18,7 @@ pub mod truth;
 
 use serde::Serialize;
 
-pub use level::Level;
+pub use map_selection::MapSelection;
 pub use rays::{Ray, Rays, SampleGrid};
 pub use region::doom::surfaces_of;
 pub use solids::Solids;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::box_grid::{BoxGrid, covers};
 use super::graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator, rectangle};
-use super::locate::{BoxGrid, covers};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 

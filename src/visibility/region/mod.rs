@@ -9,18 +9,18 @@
 //! opening, and the rest of a region's border is opaque. Doors are open. Lines that only touch an
 //! edge of an opening see nothing, but all back ends also list the regions that such lines reach.
 
+mod back_ends;
+mod box_grid;
 mod boxes;
 pub mod doom;
 mod graph;
-mod locate;
 mod quake;
-mod row;
 mod search;
 
 pub use crate::index::IdSet;
+pub use back_ends::{BACK_ENDS, BackEnd, Pvs, Scratch};
+pub use box_grid::{RegionItems, without};
 pub use graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator, rectangle};
-pub use locate::{RegionItems, without};
-pub use row::{BACK_ENDS, BackEnd, Pvs, Scratch};
 
 #[cfg(test)]
 pub use tests::leads_through;

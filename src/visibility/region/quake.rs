@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::back_ends::Pvs;
 use super::graph::{RegionGraph, RegionId, RegionLocator};
-use super::row::Pvs;
 use crate::scene::{BspChild, QuakeMap, WorldBox};
 
 /// Map units by which boxes are enlarged: map compilers round corners and planes.

@@ -19,9 +19,9 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
+use super::back_ends::Pvs;
+use super::box_grid::BoxGrid;
 use super::graph::{Opening, OpeningPlane, RegionGraph, RegionId, RegionLocator};
-use super::locate::BoxGrid;
-use super::row::Pvs;
 use crate::scene::{Dispute, Linedef, Regions, Scene, WadMap, WorldBox};
 
 pub use surfaces::surfaces_of;

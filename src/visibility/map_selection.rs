@@ -12,7 +12,7 @@ use crate::scene::{ItemKind, LoadOptions, Sample, Scene, part_names, read_bytes,
 
 /// Counts of the level stage.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Level {
+pub struct MapSelection {
     /// Number of maps in the file; 1 for a file without maps.
     pub map_count: usize,
     /// The selected map.
@@ -23,16 +23,16 @@ pub struct Level {
     pub output_count: usize,
 }
 
-impl Level {
+impl MapSelection {
     /// The level that a scene was loaded from, by its source as typed.
     ///
     /// Maps that cannot be decoded are not counted.
     ///
     /// # Errors
     /// The file cannot be read again.
-    pub fn of(source: &str, scene: &Scene, options: &LoadOptions) -> Result<Level, InputError> {
+    pub fn of(source: &str, scene: &Scene, options: &LoadOptions) -> Result<Self, InputError> {
         // A source without maps is the scene itself.
-        let alone = Level {
+        let alone = MapSelection {
             map_count: 1,
             selected: scene.name.clone(),
             input_count: scene.items.len(),
@@ -68,7 +68,7 @@ impl Level {
             Some(map.items.len())
         };
         let others: Vec<usize> = maps.into_iter().filter_map(items_of).collect();
-        Ok(Level {
+        Ok(MapSelection {
             map_count: 1 + others.len(),
             selected,
             input_count: alone.output_count + others.iter().sum::<usize>(),
@@ -124,7 +124,7 @@ mod tests {
         for (map, name) in maps.iter().zip(["A.wad", "a.wad"]) {
             let source = format!("{}#{name}", file.display());
             let scene = scene::load(&source, &Default::default()).expect("a map");
-            let level = Level::of(&source, &scene, &Default::default()).expect("a level");
+            let level = MapSelection::of(&source, &scene, &Default::default()).expect("a level");
             let items = map.load().expect("a map").items.len();
             assert_eq!((&level.selected[..], level.output_count), (name, items));
             assert_eq!((scene.items.len(), level.map_count), (items, 2));
@@ -137,7 +137,7 @@ mod tests {
         let file = written(folder.path(), &["freedm-map12", "freedm-map20"]);
         let source = format!("{file}#map20");
         let scene = scene::load(&source, &Default::default()).expect("a map");
-        let level = Level::of(&source, &scene, &Default::default()).expect("a level");
+        let level = MapSelection::of(&source, &scene, &Default::default()).expect("a level");
         let other = scene::load(&format!("{file}#map12"), &Default::default()).expect("a map");
         assert_eq!((level.map_count, &level.selected[..]), (2, "MAP20"));
         assert_eq!(level.output_count, scene.items.len());
@@ -167,12 +167,13 @@ mod tests {
         refused(&many, &["2 maps, MAP20, MAP12;"]);
         let source = format!("{many}#MAP12");
         let scene = scene::load(&source, &Default::default()).expect("a map");
-        let level = Level::of(&source, &scene, &Default::default()).expect("a level");
+        let level = MapSelection::of(&source, &scene, &Default::default()).expect("a level");
         assert_eq!((level.map_count, &level.selected[..]), (2, "MAP12"));
         let one = written(folder.path(), &["freedm-map12"]);
         for source in [one.clone(), format!("{one}#MAP12")] {
-            let level =
-                |scene: &Scene| Level::of(&source, scene, &Default::default()).expect("a level");
+            let level = |scene: &Scene| {
+                MapSelection::of(&source, scene, &Default::default()).expect("a level")
+            };
             let scene = scene::load(&source, &Default::default()).expect("a map");
             assert_eq!(level(&scene).input_count, scene.items.len());
         }
@@ -199,7 +200,8 @@ mod tests {
             let level = |part: &str| {
                 let source = format!("{}#{part}", file.display());
                 let scene = scene::load(&source, &options)?;
-                Ok::<_, InputError>((Level::of(&source, &scene, &options)?, scene.items.len()))
+                let level = MapSelection::of(&source, &scene, &options)?;
+                Ok::<_, InputError>((level, scene.items.len()))
             };
             let (of_map, items) = level("maps/b.bsp").expect("a level");
             assert_eq!((of_map.map_count, of_map.output_count), (2, items));
@@ -219,7 +221,7 @@ mod tests {
     #[test]
     fn what_has_no_maps_is_one_level() {
         let scene = scene::load("city:n=50", &Default::default()).expect("a scene");
-        let level = Level::of("city:n=50", &scene, &Default::default()).expect("a level");
+        let level = MapSelection::of("city:n=50", &scene, &Default::default()).expect("a level");
         assert_eq!((level.input_count, level.output_count), (50, 50));
     }
 }

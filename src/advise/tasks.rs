@@ -18,7 +18,7 @@ use crate::verify::ErrorCount;
 /// Task that all others are compared with: the fastest tree, six planes, f32.
 pub const BASE: usize = 0;
 
-pub struct Trials<'c> {
+pub struct TaskList<'c> {
     pub case: &'c Case<'c>,
     /// Tasks, each with a flag that is true if it is compared with the truth.
     asks: Vec<(Ask<'c>, bool)>,
@@ -32,43 +32,43 @@ pub struct CheckedAnswers {
     errors: Vec<Option<Vec<ErrorCount>>>,
 }
 
-impl<'c> Trials<'c> {
+impl<'c> TaskList<'c> {
     pub fn new(case: &'c Case<'c>) -> Self {
-        let mut trials = Trials {
+        let mut list = TaskList {
             case,
             asks: Vec::new(),
         };
-        trials.add_base();
-        trials
+        list.add_base();
+        list
     }
 
     /// Adds the base task (again); returns its index.
     pub fn add_base(&mut self) -> usize {
         let case = self.case;
-        self.index(&*case.index, &case.workload.views[..])
+        self.add_queries(&*case.index, &case.workload.views[..])
     }
 
     /// Adds a task; returns its index.
     ///
     /// `is_checked` is true if its answers are items in view, to be compared with the truth.
-    pub fn enter(&mut self, is_checked: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
+    pub fn add(&mut self, is_checked: bool, ask: impl Fn(usize, &mut Vec<ItemId>) + 'c) -> usize {
         self.asks.push((Box::new(ask), is_checked));
         self.asks.len() - 1
     }
 
     /// Adds an index queried with the given views; returns the task's index.
-    pub fn index(
+    pub fn add_queries(
         &mut self,
         index: impl Deref<Target = dyn DynIndex> + 'c,
         views: impl Deref<Target = [CameraView]> + 'c,
     ) -> usize {
-        self.enter(true, move |camera, out| {
+        self.add(true, move |camera, out| {
             index.query(views[camera].as_any(), out)
         })
     }
 
     /// Runs every task for every camera, and compares the answers with the truth.
-    pub fn answered(&self) -> CheckedAnswers {
+    pub fn check(&self) -> CheckedAnswers {
         let truths = self.case.truths();
         let mut out: Vec<ItemId> = Vec::new();
         let answered = self.asks.iter().map(|(ask, is_checked)| {
