@@ -66,13 +66,13 @@ impl Geometry<'_> {
         match self {
             Geometry::Boxes(views, _) => {
                 let boxes = views[view].bodies.iter();
-                let placed = boxes.filter_map(|body| screen.rectangle(&body.b));
-                fits_drawing(setup.samples, placed)
+                let rectangles = boxes.filter_map(|body| screen.rectangle(&body.b));
+                fits_drawing(setup.samples, rectangles)
             }
             Geometry::Triangles(surfaces, views, _) => {
                 let corners = views[view].iter().map(|&t| surfaces.corners(t));
-                let placed = corners.filter_map(|t| screen.triangle(t, surfaces.origin));
-                fits_drawing(setup.samples, placed)
+                let rectangles = corners.filter_map(|t| screen.triangle(t, surfaces.origin));
+                fits_drawing(setup.samples, rectangles)
             }
         }
     }

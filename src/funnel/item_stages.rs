@@ -221,12 +221,12 @@ impl PlanView {
     pub fn of(setup: &Setup, stages: &ItemStages, chain: &Chain, truth: &VisibleItems) -> PlanView {
         let both = setup.views.iter().zip(truth).enumerate();
         let most = both.rev().max_by_key(|(_, (_, visible))| visible.len());
-        let Some((place, (view, visible))) = most else {
+        let Some((index, (view, visible))) = most else {
             return PlanView::default();
         };
         let outputs = StageKind::OF_ITEMS.map(|stage| {
             let steps = chain.steps_with(stage, chain.of(stage));
-            (stage, stages.items(&steps, place))
+            (stage, stages.items(&steps, index))
         });
         let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
         let items = (0..).take(setup.scene.items.len());

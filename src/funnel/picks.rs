@@ -236,7 +236,7 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
     let size = [image.width, image.height].map(f64::from);
     let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
     let rows = 0..CURSORS.height;
-    let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
+    let cells = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
     let cursor = |(column, row): (u32, u32)| {
         let (x, y) = (part(column, CURSORS.width), part(row, CURSORS.height));
         let rectangle = CursorRectangle::around([x * size[0], y * size[1]], REACH, size);
@@ -246,7 +246,7 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
             volume: rectangle.volume(rays, around).ok(),
         }
     };
-    places.map(cursor).collect()
+    cells.map(cursor).collect()
 }
 
 /// Exact answers at a cursor.

@@ -27,7 +27,7 @@ const BYTES_PER_SAMPLE: u64 = 450;
 /// Bytes per solid box that the chain leaves in a view; 1,480 were measured.
 ///
 /// Includes its triangles with all their back ends, and fragments.
-const BYTES_PER_LEFT: f64 = 1600.0;
+const BYTES_PER_REMAINING: f64 = 1600.0;
 
 /// Rejects images that need more memory than is available.
 fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), InputError> {
@@ -52,7 +52,7 @@ impl<'w> Study<'w> {
         let items = ItemStages::all(setup, chain);
         if setup.shape.boxes().is_some() {
             let left = items.mean_count(chain) * setup.views.len() as f64;
-            check_memory(&setup.scene.name, (left * BYTES_PER_LEFT) as u64)?;
+            check_memory(&setup.scene.name, (left * BYTES_PER_REMAINING) as u64)?;
         }
         let triangles = TriangleStage::new(&items);
         let culled = (&triangles, chain.of(StageKind::Triangle));
@@ -121,7 +121,7 @@ impl<'w> Study<'w> {
                 return None;
             }
             let with = [&timed[..], &[row.key(self.chain)?]].concat();
-            let (unit, counts) = self.counts_behind(row, rows);
+            let (unit, counts) = self.counts_after(row, rows);
             let tasks = [with, timed.clone()];
             Some(Gain::new(stage, (row.back_end.name, unit), counts, tasks))
         });
@@ -131,7 +131,7 @@ impl<'w> Study<'w> {
     /// Unit and counts, with and without a stage that follows the item stages.
     ///
     /// Without a fragment test every fragment of the remaining items is shaded.
-    fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
+    fn counts_after(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
         let default = default_test(self.items.setup.cut_outs.is_some());
         let every = rows.iter().find(|row| row.back_end.name == default);
         match row.fragments.zip(every.and_then(|row| row.fragments)) {

@@ -106,8 +106,8 @@ impl Rays {
     /// Rays of all samples, row by row.
     pub fn of_grid(&self, grid: SampleGrid) -> impl Iterator<Item = Ray> {
         let rows = 0..grid.height;
-        let places = rows.flat_map(move |row| (0..grid.width).map(move |column| (column, row)));
-        places.map(move |(column, row)| self.sample(grid, column, row))
+        let pixels = rows.flat_map(move |row| (0..grid.width).map(move |column| (column, row)));
+        pixels.map(move |(column, row)| self.sample(grid, column, row))
     }
 
     /// Ray through a pixel's centre: column from the left, row from the top.

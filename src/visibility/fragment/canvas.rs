@@ -99,14 +99,14 @@ impl Screen {
     /// Screen rectangle of a triangle whose corners are relative to `origin`.
     pub fn triangle(&self, corners: [Vec3; 3], origin: DVec3) -> Option<Rectangle> {
         let shift = origin - self.eye;
-        let mut placed = [[0.0; 4]; 3];
-        for (corner, placed) in corners.iter().zip(&mut placed) {
+        let mut projected = [[0.0; 4]; 3];
+        for (corner, projected) in corners.iter().zip(&mut projected) {
             let corner = corner.as_dvec3();
             // The shift and the sum round once each.
             let off = 2.0 * f64::EPSILON * (corner.abs() + shift.abs()).element_sum();
-            *placed = self.project(corner + shift, off);
+            *projected = self.project(corner + shift, off);
         }
-        self.hull(&placed, |from, to| from != to)
+        self.hull(&projected, |from, to| from != to)
     }
 
     /// Projects a point relative to the eye to `[across, up, depth, size]`.

@@ -67,11 +67,11 @@ impl AlphaMasks {
         let Some(Some(tiled)) = self.of_item.get(item as usize) else {
             return true;
         };
-        let place = (probe.ray.at(at.depth) - b.min) / tiled.tile;
+        let tiles = (probe.ray.at(at.depth) - b.min) / tiled.tile;
         let [u, v] = match at.axis {
-            0 => [place.y, place.z],
-            1 => [place.x, place.z],
-            _ => [place.x, place.y],
+            0 => [tiles.y, tiles.z],
+            1 => [tiles.x, tiles.z],
+            _ => [tiles.x, tiles.y],
         };
         tiled.mask.opaque(u, v)
     }

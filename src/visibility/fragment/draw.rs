@@ -119,8 +119,8 @@ impl<B: Drawable> Drawn<B> {
     ) {
         for body in bodies {
             let item = body.item();
-            let place = body.rectangle(canvas);
-            let [tested, kept_out] = canvas.scan(place, tests.stencil, |sample, probe| {
+            let area = body.rectangle(canvas);
+            let [tested, kept_out] = canvas.scan(area, tests.stencil, |sample, probe| {
                 let Some(at) = body.hit(probe, f64::INFINITY) else {
                     return;
                 };
@@ -204,8 +204,8 @@ impl Drawn {
         let mut marked = vec![false; canvas.screen.grid.samples()];
         let mut tested = 0;
         for rectangle in rectangles {
-            let place = canvas.screen.rectangle(rectangle);
-            let [asked, _] = canvas.scan(place, None, |sample, probe| {
+            let area = canvas.screen.rectangle(rectangle);
+            let [asked, _] = canvas.scan(area, None, |sample, probe| {
                 let is_before = |at| {
                     let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
                     self.front[sample].is_none_or(before)

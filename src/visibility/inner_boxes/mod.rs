@@ -49,7 +49,7 @@ pub const BOXES: usize = 8;
 const LEAST_GAIN: f64 = 1.0 / 64.0;
 
 /// Number of attempts per box; it shrinks after each failed proof.
-const TRIES: usize = 4;
+const MAX_TRIES: usize = 4;
 
 /// Finds up to `most` (at most [`MOST_BOXES`]) large boxes inside an item.
 ///
@@ -104,11 +104,11 @@ fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f
     let tried = std::iter::from_fn(|| inside.next_box(0..cells));
     for (_, tried) in tried.take(most) {
         let [low, high] = tried.map(|cell| grid.corner(cell));
-        let Some(proven) = proven(part, Aabb::new(low, high)) else {
+        let Some(prove) = prove(part, Aabb::new(low, high)) else {
             continue;
         };
         let exact = |b| WorldBox::of(b, DVec3::ZERO);
-        let mut rest = vec![exact(&proven)];
+        let mut rest = vec![exact(&prove)];
         for (_, other) in &found {
             let other = exact(other);
             rest = rest.iter().flat_map(|b| without(b, &other)).collect();
@@ -117,14 +117,14 @@ fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f
         if gain < least {
             break;
         }
-        found.push((gain, proven));
+        found.push((gain, prove));
     }
     found
 }
 
 /// Shrinks a box about its centre until it is proven inside; else `None`.
-fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
-    for _ in 0..TRIES {
+fn prove(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
+    for _ in 0..MAX_TRIES {
         if !tried.is_empty() && is_in(part, &tried) {
             return Some(tried);
         }

@@ -118,8 +118,8 @@ impl<B: OcclusionBuffer> Work for Cull<'_, B> {
         let mut open = [0; LANES];
         // Number of survivors after which something was drawn; later ones need no second test.
         let mut early = 0;
-        while let Some(Reverse((_, place))) = queue.pop() {
-            let entry = entries[place as usize];
+        while let Some(Reverse((_, next))) = queue.pop() {
+            let entry = entries[next as usize];
             // Occluders may have been drawn since the block was queued.
             let again = !entry.block.near && entry.drawn < stats.drawn as u32;
             if again && buffer.hides(isa, &entry.block.rect) {

@@ -236,7 +236,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             };
             let mut near = [0.0; LANES];
             for i in 0..LANES {
-                let left = (column * TILE_WIDTH) as f32 + STEPS[i];
+                let left = (column * TILE_WIDTH) as f32 + TILE_COLUMNS[i];
                 let right = left + TILE_WIDTH as f32;
                 let left = if left > lowest { left } else { lowest };
                 let right = if right < highest { right } else { highest };
@@ -273,7 +273,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
 /// Tiles merged together.
 const CHUNK: usize = 8;
 /// First pixel columns of sixteen tiles, relative to the first tile.
-const STEPS: [f32; LANES] = [
+const TILE_COLUMNS: [f32; LANES] = [
     0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0, 64.0, 72.0, 80.0, 88.0, 96.0, 104.0, 112.0, 120.0,
 ];
 

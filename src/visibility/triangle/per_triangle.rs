@@ -6,7 +6,7 @@
 //! Normals are scaled so that their largest component is about 1. Let u = 2^-24 and E the error of
 //! the f32 eye. The vector from corner to eye is wrong by E and u of itself, a normal's component
 //! by u, three products and two sums by 3.01 u. Together the signed distance is wrong by at most
-//! 1.75 E + 5.1 u |way|, where |way| is the sum of the vector's absolute components and 1.75
+//! 1.75 E + 5.1 u |v|, where |v| is the sum of the vector's absolute components and 1.75
 //! exceeds the square root of three. The code takes 8 u, to cover the rounding of the bound itself
 //! (5 u of it).
 
@@ -21,10 +21,10 @@ use super::{Selection, TriangleCull, facing};
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
-/// Error relative to |way|: derived above.
+/// Error relative to |v|: derived above.
 const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
 /// Least error bound, for underflow.
-const LEAST: f64 = 1e-30;
+const MIN_ERROR: f64 = 1e-30;
 
 /// Sixteen triangles: scaled normals and first corners.
 ///
@@ -106,7 +106,7 @@ impl Work for Query<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let Query(all, eye, kept) = self;
-        let lanes = Lanes::of(isa, eye);
+        let lanes = EyeLanes::of(isa, eye);
         let PerTriangle { starts, planes, .. } = all;
         for (cluster, word) in kept.words_mut().iter_mut().enumerate() {
             let rows = &planes[starts[cluster] as usize..starts[cluster + 1] as usize];
@@ -129,7 +129,7 @@ impl Work for Query<'_> {
 }
 
 /// Eye broadcast to all lanes.
-struct Lanes<I: Isa> {
+struct EyeLanes<I: Isa> {
     at: [I::Floats; 3],
     /// -1 for a point, 0 for a direction.
     minus_weight: I::Floats,
@@ -138,31 +138,35 @@ struct Lanes<I: Isa> {
     margin: I::Floats,
 }
 
-impl<I: Isa> Lanes<I> {
+impl<I: Isa> EyeLanes<I> {
     #[inline(always)]
-    fn of(isa: I, eye: &Eye) -> Lanes<I> {
+    fn of(isa: I, eye: &Eye) -> EyeLanes<I> {
         let [x, y, z] = eye.nearest.to_array();
-        Lanes {
+        EyeLanes {
             at: [isa.splat(x), isa.splat(y), isa.splat(z)],
             minus_weight: isa.splat(-eye.weight),
             minus_one: isa.splat(-1.0),
             minus_error: isa.splat(-ERROR),
-            margin: isa.splat(round_up(1.75 * eye.error + LEAST)),
+            margin: isa.splat(round_up(1.75 * eye.error + MIN_ERROR)),
         }
     }
 }
 
 /// Lanes that certainly face the eye, and undecided lanes.
 #[inline(always)]
-fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
-    let x = way(isa, &planes.corner[0], eye.at[0], eye);
-    let y = way(isa, &planes.corner[1], eye.at[1], eye);
-    let z = way(isa, &planes.corner[2], eye.at[2], eye);
+fn sides<I: Isa>(isa: I, planes: &Planes, eye: &EyeLanes<I>) -> [u64; 2] {
+    let x = to_eye(isa, &planes.corner[0], eye.at[0], eye);
+    let y = to_eye(isa, &planes.corner[1], eye.at[1], eye);
+    let z = to_eye(isa, &planes.corner[2], eye.at[2], eye);
     let [a, b, c] = [&planes.normal[0], &planes.normal[1], &planes.normal[2]];
     let [a, b, c] = [isa.load(a), isa.load(b), isa.load(c)];
     let side = dot(isa, [a, b, c], [x, y, z]);
     // Negated absolute values, as there is only a minimum.
-    let [x, y, z] = [least(isa, x, eye), least(isa, y, eye), least(isa, z, eye)];
+    let [x, y, z] = [
+        neg_abs(isa, x, eye),
+        neg_abs(isa, y, eye),
+        neg_abs(isa, z, eye),
+    ];
     let length = isa.add(isa.add(x, y), z);
     let bound = isa.add(isa.mul(length, eye.minus_error), eye.margin);
     let above = isa.at_most(bound, side);
@@ -171,12 +175,12 @@ fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
 }
 
 #[inline(always)]
-fn way<I: Isa>(isa: I, corner: &[f32; LANES], at: I::Floats, eye: &Lanes<I>) -> I::Floats {
+fn to_eye<I: Isa>(isa: I, corner: &[f32; LANES], at: I::Floats, eye: &EyeLanes<I>) -> I::Floats {
     isa.add(at, isa.mul(isa.load(corner), eye.minus_weight))
 }
 
 /// Computes -|x|.
 #[inline(always)]
-fn least<I: Isa>(isa: I, x: I::Floats, eye: &Lanes<I>) -> I::Floats {
+fn neg_abs<I: Isa>(isa: I, x: I::Floats, eye: &EyeLanes<I>) -> I::Floats {
     isa.min(x, isa.mul(x, eye.minus_one))
 }

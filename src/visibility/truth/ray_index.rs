@@ -151,14 +151,14 @@ impl<B: Body, V: Visit<B>> Work for Traversal<'_, B, V> {
     fn run<I: Isa>(self, isa: I) {
         let Traversal(of, ray, visitor) = self;
         let Some(slabs) = RaySlabTest::of(ray, of.tree.zero, of.tree.bounds.reach()) else {
-            return of.tree.search_in_f64(ray, |place| {
-                visitor.visit(&of.bodies[place as usize].0);
+            return of.tree.search_in_f64(ray, |position| {
+                visitor.visit(&of.bodies[position as usize].0);
             });
         };
         let mut limit = f64::INFINITY;
         let mut bound = slabs.far;
-        of.tree.search(isa, &slabs, |place| {
-            let latest = visitor.visit(&of.bodies[place as usize].0);
+        of.tree.search(isa, &slabs, |position| {
+            let latest = visitor.visit(&of.bodies[position as usize].0);
             if latest < limit {
                 limit = latest;
                 bound = bound.min(round_up(limit));

@@ -39,13 +39,13 @@ impl RayTree {
         let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
         let mut root = Child::new(0, 0);
         // Parts to split, each with the node and lane that refers to it.
-        let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
+        let mut open: Vec<(ItemRange, Option<(usize, usize)>)> = Vec::new();
         if !items.is_empty() {
-            open.push((Part::of(&items, 0..items.len()), None));
+            open.push((ItemRange::of(&items, 0..items.len()), None));
         }
         while let Some((part, round_up)) = open.pop() {
             let at = nodes.len();
-            let mut parts = cut(&mut items, part);
+            let mut parts = split(&mut items, part);
             parts.sort_by_key(|part| part.len() > 1);
             let single = parts.iter().filter(|part| part.len() == 1).count();
             let child = Child::new(at, single);
@@ -250,7 +250,7 @@ impl Child {
 ///
 /// Splits the part with the largest surface first, as long as some part does not fit a node; then
 /// splits the smallest parts into single items, as many as there are lanes left for.
-fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
+fn split(items: &mut [Record], part: ItemRange) -> Vec<ItemRange> {
     let mut parts = vec![part];
     while parts.len() < LANES {
         let wide = (0..parts.len()).filter(|&i| parts[i].len() > LANES);
@@ -265,8 +265,8 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
         // Split in the middle if no plane separates the centres.
         let cut = by_surface_area(&mut items[part.range.clone()]);
         let middle = part.range.start + cut.map_or(part.len() / 2, |(_, below)| below);
-        parts.push(Part::of(items, part.range.start..middle));
-        parts.push(Part::of(items, middle..part.range.end));
+        parts.push(ItemRange::of(items, part.range.start..middle));
+        parts.push(ItemRange::of(items, middle..part.range.end));
     }
     loop {
         let left = LANES - parts.len();
@@ -275,20 +275,20 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
             break;
         };
         let part = parts.swap_remove(smallest);
-        parts.extend(part.range.map(|i| Part::of(items, i..i + 1)));
+        parts.extend(part.range.map(|i| ItemRange::of(items, i..i + 1)));
     }
     parts
 }
 
 /// Range of the items with its bounds.
-struct Part {
+struct ItemRange {
     range: Range<usize>,
     bounds: Aabb,
 }
 
-impl Part {
-    fn of(items: &[Record], range: Range<usize>) -> Part {
-        Part {
+impl ItemRange {
+    fn of(items: &[Record], range: Range<usize>) -> ItemRange {
+        ItemRange {
             bounds: Aabb::union_of(items[range.clone()].iter().map(|item| &item.bounds)),
             range,
         }

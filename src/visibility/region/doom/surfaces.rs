@@ -256,7 +256,7 @@ pub fn triangles(edges: &[[Point; 2]]) -> Option<Vec<[Point; 3]>> {
         // The new sides bound the remaining polygon, unless they were sides already.
         for (side, back) in [([a, c], [c, a]), ([c, b], [b, c])] {
             match front.iter().position(|edge| *edge == back) {
-                Some(place) => drop(front.swap_remove(place)),
+                Some(index) => drop(front.swap_remove(index)),
                 None => front.push(side),
             }
         }

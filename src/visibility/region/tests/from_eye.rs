@@ -46,12 +46,12 @@ fn a_stored_row_answers_what_is_stored() {
     let [mut answer, mut wanted] = [Vec::new(), Vec::new()];
     for _ in 0..200 {
         let rays = eye_in(&graph, &mut rng);
-        let place = graph.seen_by(&rays, Some(&pvs), &mut scratch, &mut answer);
-        assert_eq!(graph.homes(&rays, &mut homes), place);
+        let inside = graph.seen_by(&rays, Some(&pvs), &mut scratch, &mut answer);
+        assert_eq!(graph.homes(&rays, &mut homes), inside);
         let all = 0..graph.len() as u32;
         wanted.clear();
         wanted.extend(
-            all.filter(|&to| !place || homes.iter().any(|&from| pvs.row(from).contains(&to))),
+            all.filter(|&to| !inside || homes.iter().any(|&from| pvs.row(from).contains(&to))),
         );
         assert_eq!(answer, wanted);
     }

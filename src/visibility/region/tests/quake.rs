@@ -28,8 +28,8 @@ fn a_region_sees_what_the_table_of_the_map_has() {
     let (_, graph, pvs) = two_rooms();
     let seen_from = |eye| {
         let (rays, mut out) = (rays(eye, DVec3::X), Vec::new());
-        let place = graph.seen_by(&rays, Some(&pvs), &mut Scratch::default(), &mut out);
-        (place, out)
+        let inside = graph.seen_by(&rays, Some(&pvs), &mut Scratch::default(), &mut out);
+        (inside, out)
     };
     let inside = true;
     assert_eq!(seen_from([64.0, 64.0, 50.0]), (inside, vec![0, 1]));

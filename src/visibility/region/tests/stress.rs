@@ -119,14 +119,14 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
     let answer = |lens: Lens| {
         let rays = Rays::of(&Camera { frame, lens }).unwrap();
         let mut out = Vec::new();
-        let place = graph.seen_by(&rays, None, &mut Scratch::default(), &mut out);
-        (place, out.len())
+        let inside = graph.seen_by(&rays, None, &mut Scratch::default(), &mut out);
+        (inside, out.len())
     };
     let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
     assert_eq!(answer(level), (false, 40));
     // The last opening that is not beyond the far plane leads one room further.
     let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
-    let (place, count) = answer(near);
-    assert!(place);
+    let (inside, count) = answer(near);
+    assert!(inside);
     assert!((10..=12).contains(&count), "{count}");
 }

@@ -22,8 +22,8 @@ fn worlds_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let truth = SampleTruth::of(&index, &rays, grid, 1);
         let mut samples = vec![0; boxes.len()];
         let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
-        for (place, front) in fronts.into_iter().enumerate() {
-            let ray = rays.sample(grid, place as u32 % 8, place as u32 / 8);
+        for (sample, front) in fronts.into_iter().enumerate() {
+            let ray = rays.sample(grid, sample as u32 % 8, sample as u32 / 8);
             let wanted = judge::front(&ray, &boxes);
             let of_ray = index.front_of(&ray).front;
             assert_eq!(of_ray, wanted, "world {world}, {ray:?}, {boxes:?}");
@@ -33,8 +33,8 @@ fn worlds_full_of_ties_are_seen_as_whole_numbers_see_them() {
             tied += usize::from(wanted.len() > 1);
         }
         for (item, &wanted) in samples.iter().enumerate() {
-            let place = truth.visible.binary_search(&(item as ItemId));
-            assert_eq!(place.map_or(0, |place| truth.samples_of[place]), wanted);
+            let index = truth.visible.binary_search(&(item as ItemId));
+            assert_eq!(index.map_or(0, |index| truth.samples_of[index]), wanted);
             assert_eq!(truth.visible.contains(&(item as ItemId)), wanted > 0);
         }
     }

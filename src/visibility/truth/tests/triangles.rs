@@ -109,8 +109,8 @@ fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let truth = SampleTruth::of(&index, &rays, grid, 1);
         let fronts = fronts(&index, &|_, _, _| true, &rays, grid);
         let mut samples = vec![0; surfaces.items()];
-        for (place, own) in (0..).zip(&fronts) {
-            let ray = rays.sample(grid, place % 6, place / 6);
+        for (sample, own) in (0..).zip(&fronts) {
+            let ray = rays.sample(grid, sample % 6, sample / 6);
             let wanted = seen(&ray, &surfaces);
             let found = index.front_of(&ray);
             let found = [found.front, found.before];
@@ -124,8 +124,8 @@ fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
             before += wanted[1].len();
         }
         for (item, &wanted) in samples.iter().enumerate() {
-            let place = truth.visible.binary_search(&(item as ItemId));
-            assert_eq!(place.map_or(0, |place| truth.samples_of[place]), wanted);
+            let index = truth.visible.binary_search(&(item as ItemId));
+            assert_eq!(index.map_or(0, |index| truth.samples_of[index]), wanted);
         }
         // Rays that aim at corners and at midpoints of edges.
         for _ in 0..12 {
