@@ -47,12 +47,12 @@ impl<'a> Case<'a> {
 
     /// Cameras of the path with their truth, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let judged = spread(
+        let checked = spread(
             self.workload.scene.items.len(),
             MAX_TRUTHS,
             self.workload.views.len(),
         );
-        let truths = judged.filter_map(|camera| {
+        let truths = checked.filter_map(|camera| {
             let truth = Truth::of_scene(&self.workload.cameras[camera], self.workload.scene)?;
             Some((camera, truth))
         });

@@ -77,7 +77,7 @@ impl<'c> TaskList<'c> {
             let answers = (0..self.case.workload.views.len()).map(|camera| {
                 out.clear();
                 ask(camera, &mut out);
-                let truth = truths.next_if(|(judged, _)| *judged == camera);
+                let truth = truths.next_if(|(checked, _)| *checked == camera);
                 if let (Some(errors), Some((_, truth))) = (&mut errors, truth) {
                     errors.push(truth.errors(&self.case.workload.scene.items, &out));
                 }
@@ -109,8 +109,8 @@ impl CheckedAnswers {
 
     /// False positives of a task per query, mean over the cameras with a truth.
     pub fn false_positives_per_query(&self, task: usize) -> Option<f64> {
-        let judged = self.by_camera(task).filter(|own| !own.is_empty())?.len();
-        Some(self.errors(task)?.false_positives as f64 / judged as f64)
+        let checked = self.by_camera(task).filter(|own| !own.is_empty())?.len();
+        Some(self.errors(task)?.false_positives as f64 / checked as f64)
     }
 
     /// Errors of a task, by camera with a truth.

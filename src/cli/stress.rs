@@ -135,7 +135,7 @@ fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
             row.kernel = Some(kernel.name());
         }
         section.name = format!("{} by {kernel}", section.name);
-        section.tally = VerdictCounts::default();
+        section.verdicts = VerdictCounts::default();
     }
     sections.retain(|section| !section.rows.is_empty());
     sections
@@ -171,24 +171,26 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         let more = text::counted(alike.len() - MOST_SHOWN, "further kind");
         reported.push(format!("{more}: --format json"));
     }
-    let mut tally = VerdictCounts::default();
-    sections.iter().for_each(|section| tally += section.tally);
-    if tally.boxes > 0 {
+    let mut verdicts = VerdictCounts::default();
+    sections
+        .iter()
+        .for_each(|section| verdicts += section.verdicts);
+    if verdicts.boxes > 0 {
         let line = format!(
             "{} checked at camera level: {} visible, {} of them boundary contacts ({} too close \
              to decide); {} and {}; dropped without the epsilon: {}; refused because sums could \
              overflow: {}",
-            text::counted(tally.boxes as usize, "box"),
-            text::count(tally.errors.visible as usize),
-            text::count(tally.ties as usize),
-            text::count(tally.errors.undecided as usize),
-            text::counted(tally.errors.false_negatives as usize, "false negative"),
+            text::counted(verdicts.boxes as usize, "box"),
+            text::count(verdicts.errors.visible as usize),
+            text::count(verdicts.ties as usize),
+            text::count(verdicts.errors.undecided as usize),
+            text::counted(verdicts.errors.false_negatives as usize, "false negative"),
             text::counted(
-                tally.errors.touch_dropped as usize,
+                verdicts.errors.touch_dropped as usize,
                 "dropped boundary contact"
             ),
-            text::count(tally.lost_without_epsilon as usize),
-            text::count(tally.refused as usize),
+            text::count(verdicts.lost_without_epsilon as usize),
+            text::count(verdicts.refused as usize),
         );
         reported.push(text::wrapped(&line, width) + "\n");
     }

@@ -207,12 +207,12 @@ pub enum ItemOutcome {
     Lost,
 }
 
-/// The view with the most visible items, and the fate of each item.
+/// The view with the most visible items, and the outcome for each item.
 #[derive(Clone, Default, Debug)]
 pub struct PlanView {
     /// Camera of the view; `None` without views.
     pub camera: Option<Camera>,
-    /// Fates by item.
+    /// Outcomes by item.
     pub outcomes: Vec<ItemOutcome>,
 }
 
@@ -238,7 +238,7 @@ impl PlanView {
     }
 }
 
-/// Fate of an item, from the ascending ids after each stage (`None`: all items).
+/// Outcome for an item, from the ascending ids after each stage (`None`: all items).
 fn outcome(item: ItemId, sets: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> ItemOutcome {
     let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
     let removed = sets.iter().find(|(_, set)| lacks(set));

@@ -108,7 +108,7 @@ pub struct Section {
     /// Number of boxes in all cases.
     pub boxes: u64,
     /// Verdicts of the oracle (extremes at camera level).
-    pub tally: extremes::VerdictCounts,
+    pub verdicts: extremes::VerdictCounts,
     /// Checks with their outcomes.
     pub rows: Vec<Row>,
 }

@@ -67,7 +67,7 @@ pub struct Findings {
     /// Number of boxes.
     pub boxes: u64,
     /// Verdicts of the oracle at camera level.
-    pub tally: VerdictCounts,
+    pub verdicts: VerdictCounts,
     /// Structure and test of each check.
     pub checked: Vec<[String; 2]>,
     /// Faults in the order found.
@@ -187,7 +187,7 @@ impl Case {
         let boxes = self.items.len() as u64;
         let mut found = Findings {
             boxes,
-            tally: VerdictCounts {
+            verdicts: VerdictCounts {
                 boxes,
                 ties: verdicts.filter(|v| **v == Verdict::Touch).count() as u64,
                 errors: self.truth.visible,
@@ -218,7 +218,7 @@ impl Case {
                     self.scalar(&culling, &name, &seen, &mut found);
                     found.compare(built, &name, view, &items[..share]);
                 }
-                Err(error) if self.may_refuse(&error) => found.tally.refused += 1,
+                Err(error) if self.may_refuse(&error) => found.verdicts.refused += 1,
                 Err(error) => found.fault([SCALAR, &name], None, "a view", error.to_string()),
             }
         }
@@ -255,7 +255,7 @@ impl Case {
         };
         let six = six.as_any();
         let seen: Vec<ItemId> = scan(&self.items, |b| six.sees(b)).collect();
-        found.tally.lost_without_epsilon = self.errors(&seen).dropped();
+        found.verdicts.lost_without_epsilon = self.errors(&seen).dropped();
         found.compare(built, "six-plane epsilon 0", six, &self.items[..share]);
         let Ok(sphere) = view(CullingTest::Sphere) else {
             return;
@@ -287,8 +287,8 @@ impl Case {
                 (judged && errors.worst_miss > allowed, text)
             }
             _ => {
-                found.tally.errors.false_negatives += errors.false_negatives;
-                found.tally.errors.touch_dropped += errors.touch_dropped;
+                found.verdicts.errors.false_negatives += errors.false_negatives;
+                found.verdicts.errors.touch_dropped += errors.touch_dropped;
                 let text = "nothing dropped that is inside or touches, nothing empty returned";
                 (errors.dropped() > 0, text.to_owned())
             }

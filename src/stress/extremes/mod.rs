@@ -127,7 +127,7 @@ impl Extremes<'_> {
         for (seed, (group, findings)) in outcomes {
             section.cases += 1;
             section.boxes += findings.boxes;
-            section.tally += findings.tally;
+            section.verdicts += findings.verdicts;
             for [structure, test] in findings.checked {
                 *checked.entry([group.clone(), structure, test]).or_default() += 1;
             }
@@ -238,7 +238,7 @@ mod tests {
         let cameras = &sections[PLANES_FAMILIES.len()..];
         let mut off = Vec::new();
         for section in cameras {
-            let (boxes, seen) = (section.tally.boxes, section.tally.errors.visible);
+            let (boxes, seen) = (section.verdicts.boxes, section.verdicts.errors.visible);
             // At 1e15 from the origin f32 leaves few positions between in and out.
             let least = match section.name.ends_with("offset") {
                 true => boxes / 6,
@@ -249,8 +249,11 @@ mod tests {
             }
         }
         assert!(off.is_empty(), "{off:?}");
-        let bare: u64 = cameras.iter().map(|s| s.tally.lost_without_epsilon).sum();
-        let boxes: u64 = cameras.iter().map(|s| s.tally.boxes).sum();
+        let bare: u64 = cameras
+            .iter()
+            .map(|s| s.verdicts.lost_without_epsilon)
+            .sum();
+        let boxes: u64 = cameras.iter().map(|s| s.verdicts.boxes).sum();
         assert!(bare * 200 > boxes, "{bare} of {boxes} need the epsilon");
     }
 }

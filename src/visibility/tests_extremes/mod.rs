@@ -218,11 +218,11 @@ fn occlusion_rows(
         .map(|(_, id)| id)
         .collect();
     let seen = seen(&RayIndex::build(&solids), &rays, case, rng);
-    let judged = back_ends.iter().map(|(name, answer)| {
+    let checked = back_ends.iter().map(|(name, answer)| {
         let kept = answer(&occluders, &view, &in_view);
-        row(id, name, judged(&seen, kept, &in_view))
+        row(id, name, checked(&seen, kept, &in_view))
     });
-    judged.collect()
+    checked.collect()
 }
 
 /// Items that some ray meets first.
@@ -249,7 +249,7 @@ fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
 }
 
 /// Checks that every visible item is kept and that every kept item is in view.
-fn judged(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> Result<(), String> {
+fn checked(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> Result<(), String> {
     kept.sort_unstable();
     let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
     let lost: Vec<u32> = lost.copied().collect();
@@ -371,7 +371,7 @@ mod tests {
     #[test]
     fn a_missing_item_fails_its_row() {
         let passes =
-            |seen: &[ItemId], kept: &[ItemId]| judged(seen, kept.to_vec(), &[0, 1, 2]).is_ok();
+            |seen: &[ItemId], kept: &[ItemId]| checked(seen, kept.to_vec(), &[0, 1, 2]).is_ok();
         assert!(passes(&[0, 2], &[2, 0]));
         assert!(!passes(&[0, 2], &[0, 1]));
         assert!(!passes(&[0], &[0, 7]), "what is not in view");

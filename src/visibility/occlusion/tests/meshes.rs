@@ -1,4 +1,4 @@
-//! Items of meshes behind boxes inscribed in other items.
+//! Items of meshes behind boxes inside other items.
 //!
 //! No item that a ray meets first may be missing.
 
