@@ -172,9 +172,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         reported.push(format!("{more}: --format json"));
     }
     let mut verdicts = VerdictCounts::default();
-    sections
-        .iter()
-        .for_each(|section| verdicts += section.verdicts);
+    sections.iter().for_each(|s| verdicts += s.verdicts);
     if verdicts.boxes > 0 {
         let line = format!(
             "{} checked at camera level: {} visible, {} of them boundary contacts ({} too close \

@@ -238,7 +238,7 @@ impl PlanView {
     }
 }
 
-/// Outcome for an item, from the ascending ids after each stage (`None`: all items).
+/// Outcome of an item, from the ascending ids after each stage (`None`: all items).
 fn outcome(item: ItemId, sets: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> ItemOutcome {
     let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
     let removed = sets.iter().find(|(_, set)| lacks(set));
