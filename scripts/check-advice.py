@@ -31,7 +31,7 @@ def answers(advice):
     """Answers by question: the firm one, or the set of those that tie."""
     structure, test, motion = (advice[name] for name in ("structure", "test", "motion"))
     yield "structure", {structure["name"], *structure["ties"]}
-    yield "test", {test["name"], *test["ties"]}
+    yield "test", {test["name"], *(tie.split(" on ")[0] for tie in test["ties"])}
     if motion:
         yield "policy", {motion["policy"], *motion["policy_ties"]}
     for rule in advice["omissions"]:

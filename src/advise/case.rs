@@ -26,33 +26,37 @@ pub struct Case<'a> {
     pub index: Box<dyn DynIndex>,
     /// Fastest scan.
     pub scan: StructureSpec,
+    /// Structure taken by six planes.
+    pub taken: StructureSpec,
 }
 
 impl<'a> Case<'a> {
     pub fn new(
         all: &AdviseInput<'a>,
         workload: &'a Workload<'a>,
-        [tree, scan]: &[String; 2],
+        labels: &[String; 3],
     ) -> Result<Case<'a>, BuildError> {
         let setting = all.setting;
-        let [spec, scan] = [tree, scan].map(|label| spec_of(&setting.structures, label));
+        let spec = |label| spec_of(&setting.structures, label);
+        let [spec, scan, taken] = labels.each_ref().map(|label| spec(label));
         Ok(Case {
             index: spec.build(input_of(workload.scene, &workload.scene.items))?,
             workload,
             path: &setting.path,
             spec,
             scan,
+            taken,
         })
     }
 
     /// Cameras of the path with their truth, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let checked = spread(
+        let judged = spread(
             self.workload.scene.items.len(),
             MAX_TRUTHS,
             self.workload.views.len(),
         );
-        let truths = checked.filter_map(|camera| {
+        let truths = judged.filter_map(|camera| {
             let truth = Truth::of_scene(&self.workload.cameras[camera], self.workload.scene)?;
             Some((camera, truth))
         });
@@ -74,11 +78,11 @@ impl<'a> Case<'a> {
         cameras.map(view).collect()
     }
 
-    /// Builds the fastest tree over the items as a culling test indexes them.
-    pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
+    /// Builds a structure over the items as a culling test indexes them.
+    pub fn built(&self, spec: &StructureSpec, test: CullingTest) -> Result<Box<dyn DynIndex>> {
         let scene = self.workload.scene;
         let items = test.items(&scene.items);
-        self.spec.build(input_for(test, scene, &items))
+        Ok(spec.build(input_for(test, scene, &items))?)
     }
 
     /// Depth of a camera's view, at most that of the scene.
@@ -207,9 +211,10 @@ mod tests {
             path: &path,
             index: spec.build(&scene.items).unwrap(),
             scan: spec.clone(),
-            spec,
+            taken: spec.clone(),
+            spec: spec.clone(),
         };
-        let bytes = |test| case.tree_for(test).unwrap().memory().total();
+        let bytes = |test| case.built(&spec, test).unwrap().memory().total();
         // Centre and radius of each item.
         assert!(bytes(CullingTest::Sphere) - bytes(CullingTest::SixPlane) >= 300 * 16);
     }

@@ -70,9 +70,9 @@ pub struct Change {
     pub measured: [f64; 2],
     /// Reason why only the workload itself was measured; else null.
     pub not_varied: Option<String>,
-    /// Turn below `here`; null if the advice holds down to the smallest value.
+    /// Crossover below `here`; null if the advice holds down to the smallest value.
     pub below: Option<Crossover>,
-    /// Turn above `here`; null if the advice holds up to the largest value.
+    /// Crossover above `here`; null if the advice holds up to the largest value.
     pub above: Option<Crossover>,
 }
 
@@ -144,7 +144,11 @@ impl ExtraWorkloads {
                     beside.changed.push(changed);
                     parts.push(part);
                 }
-                (Err(why), Some(axis)) => beside.refused[axis as usize] = Some(why.to_string()),
+                (Err(why), Some(axis)) => {
+                    // The shares of an axis are no wish of the user.
+                    let why = why.to_string().replace("; expected a larger share", "");
+                    beside.refused[axis as usize] = Some(why);
+                }
                 (Err(_), None) => {}
             }
         }
@@ -161,7 +165,7 @@ impl ExtraWorkloads {
     pub(super) fn times(&self, input: &AdviseInput) -> anyhow::Result<Vec<Part>> {
         let parts = self.changed.iter().map(|changed| {
             let measured = changed.measured(input, self).map(|(_, part)| part);
-            measured.context("another scene or motion than the advice was planned for")
+            measured.context("another scene or motion than the advice was spec_of for")
         });
         parts.collect()
     }
@@ -196,8 +200,8 @@ impl ExtraWorkloads {
                 here: value,
                 not_varied,
                 measured: [points[0].0, points[points.len() - 1].0],
-                below: crossover(taken, down.collect()),
-                above: crossover(taken, up.collect()),
+                below: turn(taken, down.collect()),
+                above: turn(taken, up.collect()),
             })
         });
         changes.collect()
@@ -205,7 +209,7 @@ impl ExtraWorkloads {
 }
 
 /// First of the points at which another structure is faster than the chosen one.
-fn crossover(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Crossover> {
+fn turn(taken: &str, points: Vec<&(f64, &[ReportCell])>) -> Option<Crossover> {
     (1..points.len()).find_map(|n| {
         let (value, there) = *points[n];
         let first = fastest(there);
@@ -241,7 +245,11 @@ impl VariedWorkload {
     ///
     /// # Errors
     /// There is no such workload.
-    fn measured(&self, input: &AdviseInput, all: &ExtraWorkloads) -> anyhow::Result<(f64, Part)> {
+    fn measured(
+        &self,
+        input: &AdviseInput,
+        beside: &ExtraWorkloads,
+    ) -> anyhow::Result<(f64, Part)> {
         let is = |axis| self.axis == Some(axis);
         let (whole, count) = (&input.setting.scene, self.value.round() as usize);
         let part = is(Axis::Items).then(|| subset(whole, whole.origin, count));
@@ -263,12 +271,12 @@ impl VariedWorkload {
         }
         let culling = Culling::default();
         let workload = Workload::moving(scene, &path, &culling, motion, input.views)?;
-        let rebuilt = all.rebuilt.iter().filter(|_| self.axis.is_none());
+        let rebuilt = beside.rebuilt.iter().filter(|_| self.axis.is_none());
         let build = |label: &String| {
             let spec = spec_of(&input.setting.structures, label);
             Subject::build(spec, false, scene, CullingTest::SixPlane)
         };
-        let subjects: Vec<_> = all.contenders.iter().chain(rebuilt).map(build).collect();
+        let subjects: Vec<_> = beside.contenders.iter().chain(rebuilt).map(build).collect();
         let info = SceneInfo::of(scene);
         let plan = GroupPlan {
             process: u32::from(self.known.is_some()),
@@ -322,7 +330,7 @@ mod tests {
     fn advice_turns_where_another_structure_is_faster_by_more_than_a_tie() {
         let of = |tree: f64| cells(&[("wide", tree), ("linear", 100.0)]);
         let [here, tie, slower] = [of(50.0), of(103.0), of(200.0)];
-        let found = |points: &[(f64, &[ReportCell])]| crossover("wide", points.iter().collect());
+        let found = |points: &[(f64, &[ReportCell])]| turn("wide", points.iter().collect());
         // Half the time at 400 items, twice the time at 100: equal at 200.
         let first = found(&[(400.0, &here), (100.0, &slower), (10.0, &of(900.0))]).unwrap();
         assert_eq!(

@@ -9,17 +9,18 @@ mod planes;
 mod rule;
 mod rules;
 mod tasks;
+mod test_choice;
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 pub use case::AdviseInput;
 pub use change::{Axis, ExtraWorkloads};
-pub use choice::{MotionChoice, StructureChoice, TestChoice, TestRow, ns, policy_of};
+pub use choice::{MotionChoice, StructureChoice, ns, policy_of};
 pub use rule::{Advice, Omission};
 pub use tasks::{PairResult, TaskResult};
+pub use test_choice::{TestChoice, TestRow};
 
-use crate::culling::CullingTest;
 use crate::funnel::{self, FunnelPlan};
 use crate::measure::{
     Answer, OverProcesses, Part, ProcessTimes, ReportCell, Schedule, Setting, timed,
@@ -30,12 +31,13 @@ use case::Case;
 use rule::{EnteredRule, Finding, Rule};
 use rules::{RULES, input as stages};
 use tasks::{BASE, CheckedAnswers, TaskList};
+use test_choice::{Tested, add_tests};
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AdvicePlan {
-    /// Tree and scan of the rules.
-    structures: [String; 2],
+    /// Tree and scan of the rules, and structure taken by six planes.
+    structures: [String; 3],
     schedule: Schedule,
     /// Expected answers by task and camera.
     expected: Vec<Vec<Answer>>,
@@ -53,7 +55,6 @@ pub struct UntimedAdvice {
     /// Counts of the additional workloads.
     counted: Vec<Part>,
     structure: StructureChoice,
-    motion: Option<MotionChoice>,
     funnel: Result<funnel::UntimedFunnel, String>,
 }
 
@@ -71,22 +72,21 @@ pub fn prepare(
     let Setting { scene, path, .. } = input.setting;
     let workload = input.workload()?;
     let structure = StructureChoice::of(&cells);
-    let structures = structure.tree_and_scan_labels();
+    let structures = structure.labels();
     let items = scene.items.len() as f64;
     let visible = cells.iter().find_map(|cell| cell.value("visible_count"));
     let moved = workload.motion.as_ref().map(Motion::share);
     let here = [Some(items), visible.map(|count| count / items), moved];
     let contenders = structure.contenders(moved.is_some());
-    let choice = (workload.motion.as_ref()).map(|_| MotionChoice::start(input, &structure));
-    let (motion, rebuilt) = choice.unzip();
-    let labels = (contenders, rebuilt.flatten());
+    let rebuilt = MotionChoice::rebuilt(input, &structure).and_then(Result::ok);
+    let labels = (contenders, rebuilt);
     let (beside, counted) = ExtraWorkloads::plan(input, labels, here, progress);
     let case = Case::new(input, &workload, &structures)?;
-    let mut list = TaskList::new(&case);
-    let entered = add_all(&mut list, progress)?;
+    let mut tasks = TaskList::new(&case);
+    let entered = enter(&mut tasks, progress)?;
     progress("answers, checked");
-    let answered = list.check();
-    let tasks = list.tasks(&answered.answers);
+    let answered = tasks.answered();
+    let tasks = tasks.tasks(&answered.answers);
     let funnel = funnel::prepare(&stages(input.setting, &case.spec), progress);
     let funnel = funnel.map_err(|error| error.to_string());
     Ok(UntimedAdvice {
@@ -99,7 +99,6 @@ pub fn prepare(
         },
         funnel,
         structure,
-        motion,
         counted,
         entered,
         answered,
@@ -109,14 +108,14 @@ pub fn prepare(
 /// Times the plan in one process.
 ///
 /// # Errors
-/// The errors of [`prepare`], and a scene other than the planned one.
+/// The errors of [`prepare`], and a scene other than the spec_of one.
 pub fn time(input: &AdviseInput, plan: &AdvicePlan) -> Result<ProcessTimes> {
     let protocol = &input.setting.protocol;
     let workload = input.workload()?;
     let case = Case::new(input, &workload, &plan.structures)?;
-    let mut list = TaskList::new(&case);
-    add_all(&mut list, &|_| ())?;
-    let tasks = list.tasks(&plan.expected);
+    let mut tasks = TaskList::new(&case);
+    enter(&mut tasks, &|_| ())?;
+    let tasks = tasks.tasks(&plan.expected);
     let mut times = ProcessTimes {
         parts: plan.beside.times(input)?,
         ..ProcessTimes::of(&timed(&tasks, &plan.schedule, protocol, &|_| ()))
@@ -132,16 +131,18 @@ impl UntimedAdvice {
     /// Derives the advice from the times of all processes.
     pub fn conclude(self, input: &AdviseInput, processes: &[ProcessTimes]) -> Advice {
         let (times, answered) = (OverProcesses::of(processes), &self.answered);
-        let ([tree, _], beside) = (self.plan.structures, &self.plan.beside);
-        let tests = &self.entered.tests;
-        let test = TestChoice::of(tree, input.draw_ns, tests, answered, &times);
+        let beside = &self.plan.beside;
         let groups = beside.groups(self.counted, processes);
         let (mut structure, duel) = (self.structure, beside.here(&groups));
         structure.add_ties(&beside.contenders, duel.unwrap_or_default());
-        let changes = beside.changes(duel.unwrap_or(&structure.rows), &groups);
+        let (tests, costs) = (self.entered.tests, [input.draw_ns, input.views as f64]);
+        let test = TestChoice::of(costs, &mut structure, tests, answered, &times);
+        // A tree taken for its test was not varied.
+        let mut changes = beside.changes(duel.unwrap_or(&structure.rows), &groups);
+        changes.retain(|_| structure.name.as_ref() == beside.contenders.first());
         let rebuilds = duel.filter(|_| beside.rebuilt.is_some());
         let policies = rebuilds.unwrap_or(&structure.rows);
-        let motion = (self.motion).map(|motion| motion.choose(&structure, policies));
+        let motion = (input.motion).map(|_| MotionChoice::of(input, &structure, policies));
         // The times of the stages follow those of the tasks.
         let tasks = self.plan.expected.len();
         let of_stages = processes.iter().map(|process| ProcessTimes {
@@ -162,35 +163,36 @@ impl UntimedAdvice {
             funnel,
         };
         let rules = self.entered.rules.into_iter();
-        let omissions = rules.map(|(rule, entered)| {
-            let check = entered.sides.map(|sides| sides.check(answered, &times));
-            let finding = (entered.conclude)(&advice, check.as_ref());
+        let settled = rules.map(|(rule, draft)| {
+            let check = draft.sides.map(|sides| sides.check(answered, &times));
+            let mut finding = (draft.conclude)(&advice, check.as_ref());
+            finding.compared = (finding.compared).filter(|_| advice.structure.name.is_some());
             rule.omission(finding, check)
         });
-        advice.omissions = omissions.collect();
+        advice.omissions = settled.collect();
         advice
     }
 }
 
 /// All tasks, in the order in which every process adds them.
 struct RuleTasks {
-    tests: Vec<(CullingTest, usize)>,
+    tests: Vec<Tested>,
     rules: Vec<(&'static Rule, EnteredRule)>,
     twin: usize,
 }
 
-fn add_all(list: &mut TaskList, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
+fn enter(tasks: &mut TaskList, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
     let mut rules = Vec::with_capacity(RULES.len());
     for rule in RULES {
         progress(rule.name);
         // A rule whose tasks cannot be added does not apply.
-        let entered = (rule.add_tasks)(list);
+        let draft = (rule.enter)(tasks);
         let none = |error: anyhow::Error| EnteredRule::new(None, Finding::none(error.to_string()));
-        rules.push((rule, entered.unwrap_or_else(none)));
+        rules.push((rule, draft.unwrap_or_else(none)));
     }
     Ok(RuleTasks {
-        tests: choice::add_tests(list)?,
-        twin: list.add_base(),
+        tests: add_tests(tasks)?,
+        twin: tasks.add_base(),
         rules,
     })
 }

@@ -6,9 +6,9 @@ use anyhow::bail;
 use glam::DVec3;
 
 use super::case::{NO_NODES, TOLERANCE, subset};
-use super::choice::TestChoice;
 use super::rule::{EnteredRule, Finding};
 use super::tasks::{BASE, TaskList, TaskPair};
+use super::test_choice::TestChoice;
 use crate::camera::PlaneOptions;
 use crate::culling::{Arithmetic, CameraView, Culling, CullingTest};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
@@ -40,11 +40,13 @@ pub fn needless_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let reason = format!("scene is inside {inside} of {planes}");
     // Two sides with the same planes would only differ by noise.
     let sides = (inside > 0).then(|| {
-        let left_out = tasks.add_queries(&*case.index, fewer);
+        let left_out = tasks.index(&*case.index, fewer);
         TaskPair::new(&case.spec.label, BASE, left_out)
     });
-    let finding = Finding::new(share, MAX_NEEDED, reason);
-    Ok(EnteredRule::new(sides, finding))
+    Ok(EnteredRule::new(
+        sides,
+        Finding::new(share, MAX_NEEDED, reason),
+    ))
 }
 
 /// Removes the planes that contain the bounds.
@@ -87,9 +89,9 @@ pub fn plane_masks(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
         finding = Finding::new(1.0 - fewer as f64 / all as f64, MIN_SAVED, reason);
     }
     let (other, views) = (tree.clone(), volumes.clone());
-    let kept = tasks.add(true, move |n, out| query(kernel, &tree, &volumes[n], out));
-    let left_out = tasks.add(true, move |n, out| {
-        query(kernel, &other, &Unmasked(&views[n]), out)
+    let kept = tasks.enter(true, move |n, out| see(kernel, &tree, &volumes[n], out));
+    let left_out = tasks.enter(true, move |n, out| {
+        see(kernel, &other, &Unmasked(&views[n]), out)
     });
     let sides = TaskPair::new(Wide::INFO.name, kept, left_out);
     Ok(EnteredRule::concluded(sides, |advice, _| {
@@ -100,7 +102,7 @@ pub fn plane_masks(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     }))
 }
 
-fn query<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
+fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
     let recorder = &mut NoRecorder;
     // A Vec never breaks off.
     let _ = kernel.run(Query {
@@ -146,11 +148,10 @@ impl QueryVolume for Unmasked<'_> {
 /// Rule: axes beyond the six planes, from the volume's own box and silhouettes.
 ///
 /// The exact test adds them. They cost test time and save the drawing of false positives.
-pub fn six_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
-    let exact = Culling::new(CullingTest::Exact, Arithmetic::F32, PlaneOptions::default());
-    let sides = against_base(tasks, &exact)?;
-    Ok(EnteredRule::concluded(sides, move |advice, check| {
-        let sides = check.map(|check| [&check.kept, &check.left_out]);
+pub fn six_planes() -> anyhow::Result<EnteredRule> {
+    Ok(EnteredRule::concluded(None, |advice, _| {
+        let check = &advice.test.axes;
+        let sides = (check.as_ref()).map(|check| [&check.kept, &check.left_out]);
         let more = sides.and_then(|[exact, six]| {
             Some(six.false_positives_per_query? - exact.false_positives_per_query?)
         });
@@ -159,7 +160,10 @@ pub fn six_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
         };
         let draw_ns = advice.draw_ns;
         let reason = format!("with {} ns/item drawn", significant(draw_ns));
-        let finding = Finding::new(more * draw_ns, exact.ns - six.ns, reason);
+        let finding = Finding {
+            check: check.clone(),
+            ..Finding::new(more * draw_ns, exact.ns - six.ns, reason)
+        };
         with_choice(finding, &advice.test)
     }))
 }
@@ -174,6 +178,7 @@ fn with_choice(mut finding: Finding, choice: &TestChoice) -> Finding {
     // The chosen side by its chosen test, the other by its best.
     let total = |with: bool| {
         let rows = choice.rows.iter().filter(|row| with_axes(row.test) == with);
+        let rows = rows.filter(|row| choice.structure.as_ref() == Some(&row.structure));
         let rows = rows.filter(|row| with != kept || row.test == taken);
         rows.filter_map(|row| row.total_ns).min_by(f64::total_cmp)
     };
@@ -181,14 +186,6 @@ fn with_choice(mut finding: Finding, choice: &TestChoice) -> Finding {
     finding.leaves_out = Some(!kept);
     finding.is_tie = Some(choice.ties.iter().any(|name| with_axes(name) != kept));
     finding
-}
-
-/// Compares the tree with another culling's views and the tree with default views.
-fn against_base(tasks: &mut TaskList, culling: &Culling) -> anyhow::Result<TaskPair> {
-    let case = tasks.case;
-    let views = case.views_by(culling)?;
-    let kept = tasks.add_queries(case.tree_for(culling.test)?, views);
-    Ok(TaskPair::new(&case.spec.label, kept, BASE))
 }
 
 /// Rule: the plane test in f64.
@@ -199,8 +196,12 @@ pub fn f64_kernel(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let case = tasks.case;
     let planes = PlaneOptions::default();
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
-    let finding = of_margin(case.margin(&case.workload.around));
-    Ok(EnteredRule::new(against_base(tasks, &in_f64)?, finding))
+    let kept = tasks.index(&*case.index, case.views_by(&in_f64)?);
+    let sides = TaskPair::new(&case.spec.label, kept, BASE);
+    Ok(EnteredRule::new(
+        sides,
+        of_margin(case.margin(&case.workload.around)),
+    ))
 }
 
 fn of_margin(margin: f64) -> Finding {
@@ -236,7 +237,7 @@ pub fn rebasing(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     if margin > TOLERANCE && better > margin / 2.0 {
         bail!("about no origin are coordinates much smaller");
     }
-    let there = tasks.add_queries(case.spec.build(&other.items)?, views);
+    let there = tasks.index(case.spec.build(&other.items)?, views);
     let [kept, left_out] = [[there, BASE], [BASE, there]][usize::from(is_moved)];
     let sides = TaskPair::new(&case.spec.label, kept, left_out);
     Ok(EnteredRule::new(sides, of_margin(margin)))
@@ -293,8 +294,8 @@ mod tests {
             out.sort_unstable();
             let mut timed = Vec::new();
             match masked {
-                true => query(Kernel::best(), &tree, &volume, &mut timed),
-                false => query(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
+                true => see(Kernel::best(), &tree, &volume, &mut timed),
+                false => see(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
             }
             timed.sort_unstable();
             assert_eq!(timed, out);
@@ -318,14 +319,17 @@ mod tests {
                 (tests[2], vec![tests[1]], Decision::Keep, true),
                 (tests[0], vec![tests[2]], Decision::LeaveOut, true),
                 (tests[1], vec![tests[3]], Decision::LeaveOut, false),
+                (tests[0], vec!["exact on bvh"], Decision::LeaveOut, false),
             ] {
                 let statistic = if predicted { 0.5 } else { 2.0 };
                 let finding = Finding::new(statistic, 1.0, "");
                 let mut choice = TestChoice {
                     name: Some(taken),
-                    ties,
-                    structure: "wide".to_owned(),
+                    ties: ties.into_iter().map(str::to_owned).collect(),
+                    structure: Some("wide".to_owned()),
                     rows: Vec::new(),
+                    costs: None,
+                    axes: None,
                 };
                 let settled = |choice: &TestChoice| {
                     some_rule(Basis::Rule).omission(with_choice(finding.clone(), choice), None)

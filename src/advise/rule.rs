@@ -5,8 +5,9 @@
 use serde::Serialize;
 
 use super::change::Change;
-use super::choice::{MotionChoice, StructureChoice, TestChoice};
+use super::choice::{MotionChoice, StructureChoice};
 use super::tasks::{Basis, Decision, PairResult, TaskList, TaskPair, is_longer, of_costs};
+use super::test_choice::TestChoice;
 use crate::funnel::FunnelReport;
 use crate::statistics::Estimate;
 
@@ -23,10 +24,10 @@ pub struct Rule {
     /// The rule leaves the work out if the statistic is at most the threshold.
     pub statistic_name: &'static str,
     #[serde(skip)]
-    pub(super) basis: Basis,
+    pub(super) by: Basis,
     /// Adds the tasks of both sides.
     #[serde(skip)]
-    pub(super) add_tasks: for<'c> fn(&mut TaskList<'c>) -> anyhow::Result<EnteredRule>,
+    pub(super) enter: for<'c> fn(&mut TaskList<'c>) -> anyhow::Result<EnteredRule>,
 }
 
 /// Structure, test and features to leave out, with the evidence.
@@ -109,12 +110,12 @@ pub struct EnteredRule {
 }
 
 impl EnteredRule {
-    /// Draft whose finding does not depend on times.
+    /// EnteredRule whose finding does not depend on times.
     pub fn new(sides: impl Into<Option<TaskPair>>, finding: Finding) -> EnteredRule {
         EnteredRule::concluded(sides, move |_, _| finding)
     }
 
-    /// Draft whose finding depends on the advice so far and the rule's measurement.
+    /// EnteredRule whose finding depends on the advice so far and the rule's measurement.
     pub fn concluded(
         sides: impl Into<Option<TaskPair>>,
         conclude: impl FnOnce(&Advice, Option<&PairResult>) -> Finding + 'static,
@@ -131,7 +132,7 @@ impl Rule {
     pub fn omission(&'static self, finding: Finding, check: Option<PairResult>) -> Omission {
         let check = check.or(finding.check);
         let timed = check.as_ref().map(|c| [c.kept.ns, c.left_out.ns]);
-        let cost_ns = finding.cost_ns.or(timed);
+        let cost_ns = finding.compared.and(finding.cost_ns.or(timed));
         let both = check.as_ref().zip(cost_ns);
         let ratio = both.and_then(|(check, [kept, left_out])| {
             let sides = [[check.kept.ns, kept], [check.left_out.ns, left_out]];
@@ -152,8 +153,10 @@ impl Rule {
             check,
         };
         let check = omission.check.as_ref();
-        let by_clock = check.filter(|_| self.basis == Basis::Time);
+        let by_clock = check.filter(|_| self.by != Basis::Rule);
         let by_clock = by_clock.and_then(|check| is_longer(check.ratio?));
+        // An error decides, unless work that it does not need saves time.
+        let by_clock = by_clock.filter(|longer| self.by == Basis::Time || !longer);
         let is_lost = omission.loses_items();
         let compared = finding.compared;
         let order = compared.and_then(|[own, most]| own.partial_cmp(&most));
@@ -197,7 +200,7 @@ pub struct Omission {
 impl Omission {
     /// Returns yes, no, or either for a tie; empty if the rule does not apply.
     pub fn answer(&self) -> &'static str {
-        let by_cost = self.rule.basis != Basis::Error && !self.loses_items();
+        let by_cost = self.rule.by != Basis::Error && !self.loses_items();
         match self.decision {
             Decision::NotApplicable => "",
             _ if self.is_tie && by_cost => "either",
@@ -214,8 +217,7 @@ impl Omission {
 
     /// Returns `true` if two sides that must agree did not.
     pub fn is_wrong(&self) -> bool {
-        let by_time = self.rule.basis == Basis::Time;
-        let check = self.check.as_ref().filter(|_| by_time);
+        let check = self.check.as_ref().filter(|_| self.rule.by == Basis::Time);
         check.is_some_and(|check| !check.same_answers)
     }
 }
@@ -228,13 +230,13 @@ mod tests {
     use super::*;
 
     /// A rule without tasks.
-    pub fn some_rule(basis: Basis) -> &'static Rule {
+    pub fn some_rule(by: Basis) -> &'static Rule {
         Box::leak(Box::new(Rule {
             name: "rule",
             left_out: "something",
             statistic_name: "its size",
-            basis,
-            add_tasks: |_| Ok(EnteredRule::new(None, Finding::default())),
+            by,
+            enter: |_| Ok(EnteredRule::new(None, Finding::default())),
         }))
     }
 }

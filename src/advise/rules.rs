@@ -23,7 +23,7 @@ use crate::visibility::SampleGrid;
 
 /// All rules: name, work to leave out; statistic; decision.
 pub(super) const RULES: &[Rule] = rows! {
-    Rule { name, left_out, statistic_name, basis, add_tasks }
+    Rule { name, left_out, statistic_name, by, enter }
     "needless-planes", "all six planes",
         "share of all planes that the n-vertex of the scene's bounds is not inside of",
         Time, planes::needless_planes;
@@ -31,7 +31,7 @@ pub(super) const RULES: &[Rule] = rows! {
         Time, planes::plane_masks;
     "no-index", "index", "items", Time, no_index;
     "six-planes", "exact test (SAT)", "cost of drawing what six planes let through, ns a query",
-        Statistic, planes::six_planes;
+        Statistic, |_| planes::six_planes();
     "regions", "portals",
         "share of the items left by the other stages that lie in no region that is seen",
         Statistic, |_| reads(Region);
@@ -58,7 +58,7 @@ fn no_index(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let case = tasks.case;
     let [scan, tree] = [&case.scan, &case.spec].map(|spec| spec.label.clone());
     let items = &case.workload.scene.items;
-    let whole = tasks.add_queries(case.scan.build(items)?, &case.workload.views[..]);
+    let whole = tasks.index(case.scan.build(items)?, &case.workload.views[..]);
     let place = ["", ", at rest"][usize::from(case.workload.motion.is_some())];
     let sides = TaskPair::new(format!("{tree} against {scan}{place}"), BASE, whole);
     let all = items.len() as f64;
@@ -67,7 +67,9 @@ fn no_index(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
         // Follows the chosen structure if there was a choice.
         let [tree, fastest] = taken.tree_and_scan();
         let both = tree.zip(fastest);
+        let of_pairs = advice.test.costs;
         let costs = both.and_then(|(tree, scan)| Some([ns(tree)?, ns(scan)?]));
+        let costs = of_pairs.or(costs);
         let is_tie = costs.map(|_| taken.is_scan_or_tree());
         let alone = check.filter(|_| costs.is_none());
         let change = advice.changes.iter().find(|c| c.axis == Axis::Items);
@@ -89,6 +91,7 @@ fn no_index(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
             _ if costs.is_none() => format!("by all items alone{place}"),
             _ if is_tie == Some(true) => "a scan and a tree tie".to_owned(),
             _ if scan_wins => "a scan wins".to_owned(),
+            _ if of_pairs.is_some() => "a tree wins with its test".to_owned(),
             0.0 => format!("no scan wins from {least} items on"),
             _ => format!("a scan wins up to {}", counted(most, "item")),
         };
@@ -107,8 +110,8 @@ fn no_index(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
 /// are wide. Bounds stay three-dimensional either way.
 fn third_dimension(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let case = tasks.case;
-    let (scene, execution) = (case.workload.scene, case.spec.execution);
-    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, execution));
+    let (scene, by) = (case.workload.scene, case.spec.execution);
+    let [octree, quadtree] = ["octree", "quadtree"].map(|name| default_of(name, by));
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let extent = scene.bounds.max.as_dvec3() - scene.bounds.min.as_dvec3();
     let mut extents = extent.to_array();
@@ -116,7 +119,7 @@ fn third_dimension(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let [height, widths @ ..] = extents;
     let cell = 2.0 * (widths[0] * widths[1]).sqrt() / (scene.items.len() as f64 / leaf).sqrt();
     let [kept, left_out] = [octree.build(&scene.items)?, quadtree.build(&scene.items)?]
-        .map(|index| tasks.add_queries(index, &case.workload.views[..]));
+        .map(|index| tasks.index(index, &case.workload.views[..]));
     let sides = TaskPair::new("octree against quadtree", kept, left_out);
     Ok(EnteredRule::concluded(sides, move |advice, _| {
         if advice.structure.is_scan() {
@@ -177,10 +180,10 @@ fn frame_correction(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let steps = path.cameras.len() + path.left_out;
     let [(error, without), (_, with)] =
         ["f32", "f32-polar-100"].map(|method| walk(method, steps as u64));
-    let [kept, left_out] = [with, without].map(|ask| tasks.add(false, ask));
+    let [kept, left_out] = [with, without].map(|ask| tasks.enter(false, ask));
     // The error of a basis that is lost is infinite.
     let error = error.unwrap_or(f64::INFINITY);
-    let reason = format!("{}: error {error:.1e}", counted(steps, "step"));
+    let reason = format!("times of 500 steps; of {steps}: error {error:.1e}");
     let finding = Finding::new(error, TOLERANCE, reason);
     let sides = TaskPair::new("500 steps of a frame", kept, left_out);
     Ok(EnteredRule::new(sides, finding))

@@ -261,9 +261,10 @@ fn evidence(advice: &Advice) -> Vec<Block> {
             table(policies),
         ));
     }
-    let (on, ns) = (&advice.test.structure, advice.draw_ns);
-    let tests = format!("Culling tests on {on}, with {ns} ns to draw an item that cannot be seen:");
+    let ns = advice.draw_ns;
+    let tests = format!("Culling tests, with {ns} ns to draw an item that cannot be seen:");
     let columns: &[Column<&TestRow>] = &[
+        ("structure", |r| r.structure.clone()),
         ("test", |r| r.test.to_owned()),
         (">query", |r| some(r.query_ns, time_within)),
         (">false positives %", |r| text::rate(r.excess, 100.0)),

@@ -60,8 +60,9 @@ pub fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
 fn json_has_the_documented_fields() {
     let top = "draw_ns processes twin structure test omissions motion changes";
     let times = "query_ns query_ns_lower query_ns_upper";
-    let test_row =
-        format!("test {times} excess false_negative_ppm false_positives_per_query total_ns");
+    let test_row = format!(
+        "structure test {times} excess false_negative_ppm false_positives_per_query total_ns"
+    );
     let omission = "rule left_out statistic_name statistic threshold saving decision tie reason \
          cost_ns check";
     let side = "ns excess false_positives_per_query false_negative_ppm";
@@ -140,6 +141,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
         if set("regions rebuild").contains(name) || of_nodes && taken == "linear" {
             // Boxes in the open and at rest, or no nodes.
             assert_eq!(omission["decision"], "not_applicable", "{omission}");
+            assert!(omission["cost_ns"].is_null(), "{omission}");
             continue;
         }
         let (statistic, threshold) = (number(omission, "statistic"), number(omission, "threshold"));
@@ -162,11 +164,15 @@ fn every_rule_is_there_once_with_both_sides_checked() {
             let excess = ["kept", "left_out"].map(|side| &check[side]["excess"]);
             assert_eq!(excess[0], excess[1], "{omission}");
             assert_eq!(check["same_answers"], true, "{omission}");
-        } else if set("rebasing f64-kernel").contains(name) {
-            assert_eq!(omission["decision"] == "leave_out", predicted, "{omission}");
+        } else if set("rebasing f64-kernel").contains(name) && !predicted {
+            assert_eq!(omission["decision"], "keep", "{omission}");
         }
         assert!(number(&check["kept"], "ns") > 0.0 && number(&check["left_out"], "ns") > 0.0);
         assert_ratio(check);
+        if name == "frame-correction" {
+            // Of a step, not of the 500 that were timed together.
+            assert!(number(&check["kept"], "ns") < 4000.0, "{omission}");
+        }
         // What is hidden is in the frustum all the same: another truth.
         if !set("occlusion back-faces frame-correction").contains(name) {
             for side in ["kept", "left_out"] {
@@ -209,7 +215,12 @@ fn tests_and_structures_have_their_rows() {
     assert_eq!(structure["name"], rows[0]["structure"]);
     let times: Vec<f64> = rows.iter().map(|row| metric(row, "query_ns")).collect();
     assert!(times.is_sorted(), "{times:?}");
-    let rows = array(&small()["test"], "rows");
+    // A scan that is taken has four rows, and the tree four more.
+    let rows = &array(&small()["test"], "rows")[..4];
+    assert!(
+        rows.iter()
+            .all(|row| row["structure"] == rows[0]["structure"])
+    );
     let names: Vec<&str> = rows.iter().filter_map(|r| r["test"].as_str()).collect();
     assert_eq!(names, ["sphere", "six-plane", "six-box", "exact"]);
     let excess: Vec<f64> = rows

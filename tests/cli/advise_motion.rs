@@ -119,8 +119,8 @@ fn what_is_recorded_is_not_varied_and_that_is_told() {
     let motion =
         b"time_s,id,min_x,min_y,min_z,max_x,max_y,max_z\n0,0,0,0,0,1,1,1\n1,0,1,0,0,2,1,1\n";
     let folder = folder(&[("m.csv", motion)]);
-    let line =
-        "advise --scene uniform:n=200 --path orbit:frames=2 --structure linear,wide --motion m.csv";
+    let line = "advise --scene uniform:n=200 --path orbit:frames=2 --structure linear,wide --motion m.csv \
+         --draw-ns 0";
     let told = works(folder.path(), &format!("{line} --processes 1"));
     for axis in ["number of items", "share moved"] {
         let wanted = format!("\n  {axis}: not varied: the motion is recorded\n");

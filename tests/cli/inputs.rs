@@ -405,6 +405,13 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             "{told}"
         );
     }
+    let line = "advise --scene z.csv --path away.csv --structure bvh --processes 1 --format json";
+    let advice = json(&cullbench(folder.path(), line).out);
+    assert!(advice["structure"]["name"].is_null() && advice["test"]["name"].is_null());
+    assert!(array(&advice, "changes").is_empty());
+    for rule in array(&advice, "omissions") {
+        assert_eq!(rule["decision"], "not_applicable", "{rule}");
+    }
     // The warnings about cameras are on the pages too.
     for line in [
         "funnel --scene z.csv --path away.csv --samples 32x18 --processes 1 --html page.html",
