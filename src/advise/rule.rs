@@ -115,7 +115,7 @@ impl EnteredRule {
         EnteredRule::concluded(sides, move |_, _| finding)
     }
 
-    /// EnteredRule whose finding depends on the advice so far and the rule's measurement.
+    /// Rule whose finding depends on the advice so far and on its measurement.
     pub fn concluded(
         sides: impl Into<Option<TaskPair>>,
         conclude: impl FnOnce(&Advice, Option<&PairResult>) -> Finding + 'static,

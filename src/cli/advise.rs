@@ -279,7 +279,8 @@ fn evidence(advice: &Advice) -> Vec<Block> {
     blocks
 }
 
-fn ties(names: &[impl AsRef<str>]) -> String {
+/// " (a tie with wide, bvh)".
+pub fn ties(names: &[impl AsRef<str>]) -> String {
     some(names.first(), |_| format!(" ({})", tie(names)))
 }
 

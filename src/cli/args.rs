@@ -66,7 +66,8 @@ pub enum Command {
     Funnel(FunnelArgs),
     /// Recommend a structure, a test and work to skip for a scene, with the evidence
     Advise(AdviseArgs),
-    /// Measure errors of camera updates (turns, spring arms) after millions of steps
+    /// Measure errors of camera updates: turns after millions of steps, spring arms
+    /// with 1, 2, 4, 16 and 64 steps per frame
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, and check their declared outcomes
     Stress(StressArgs),

@@ -60,6 +60,8 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
     let [yaw, pitch, roll] = STEADY;
     let (steps, rounds) = (report.steps as f64, text::counted(report.rounds, "round"));
     let over = text::over(report.processes, None);
+    let tried = text::joined(drift::SUBSTEPS.map(|n| n.to_string()));
+    let starts = text::joined(drift::STARTS.map(|share| share.to_string()));
     let mut blocks = vec![
         Block::line(format!(
             "Camera updates, bases after {steps:e} steps; {over}; {rounds} in each."
@@ -72,9 +74,10 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
             "Spring arms, critically damped, {RATE_HZ} frames a second"
         )),
         Block::line(format!(
-            "The target is known where frames end. xN: N steps per frame, then the largest error at \
-             the end of a frame in {SECONDS} s and the thread CPU time per simulated second; no: \
-             even the least error is larger."
+            "The target is known where frames end. xN: N steps per frame ({tried} are tried), then \
+             the largest error at the end of a frame in {SECONDS} s, started {starts} from zero, \
+             and the thread CPU time per simulated second; no: even the least error of these is \
+             larger."
         )),
     ];
     blocks.push(Block::Table(by_stiffness(report)));
@@ -129,7 +132,7 @@ fn by_stiffness(report: &DriftReport) -> Table {
     Table::grid(&format!("within {ARM_TOLERANCE:e}"), cells)
 }
 
-/// The fewest precise steps, else the most precise: "x4: 1.2e-4, 3.21 us".
+/// The fewest precise steps tried, else the most precise: "x4: 1.2e-4, 3.21 us".
 fn within(points: &[ArmPoint]) -> String {
     let is_good = |p: &&ArmPoint| p.position_error <= ARM_TOLERANCE;
     let sound = points.iter().filter(|p| !p.position_error.is_nan());

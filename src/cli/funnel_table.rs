@@ -132,8 +132,6 @@ fn gain(report: &FunnelReport, stage: StageKind) -> Option<&Gain> {
 }
 
 /// Cost of drawing above which a stage pays off: "2.03 us/item".
-///
-/// Its interval, in JSON, excludes the machine's speed, which affects the stage's time.
 fn worth(gain: &Gain) -> String {
     let unit = gain.unit.trim_end_matches('s');
     let Some(ns) = gain.break_even else {

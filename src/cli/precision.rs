@@ -7,12 +7,14 @@ use std::cmp::Ordering;
 
 use anyhow::Result;
 
+use super::advise::ties;
 use super::args::PrecisionArgs;
 use super::document::{Block, Column, Table, show};
 use super::figure::{Figure, ends, picture};
 use super::page::to_page;
 use super::processes::Timing;
 use super::run_figures::{Measured, against};
+use super::run_verdict::BLIND;
 use super::study::{ROUNDS, Study, load};
 use super::text::{self, significant, some, time_plus_minus};
 use super::{Ending, diagram, expect_places, print, write_if};
@@ -82,7 +84,7 @@ pub fn time(registry: &Registry, args: &PrecisionArgs, timing: &Timing) -> Resul
 
 pub fn conclusions(p: &Precision) -> Vec<String> {
     let (sizes, cameras) = (of_sizes(&p.sweeps), of_cameras(&p.sweeps));
-    let others = [of_storage(p), sizes, cameras].into_iter();
+    let others = [sizes, cameras].into_iter();
     of_points(p).into_iter().chain(others.flatten()).collect()
 }
 
@@ -96,32 +98,48 @@ fn missed(point: &Point) -> u64 {
     point.counts.unwrap_or_default().false_negatives
 }
 
+/// Number of visible items of all cameras, if any culling was judged.
+fn visible(p: &Precision) -> Option<u64> {
+    let mut counts = p.points.iter().filter_map(|point| point.counts);
+    Some(counts.next()?.visible)
+}
+
 /// The false positives of a point in words.
 fn extras(point: &Point) -> String {
-    match point.excess {
-        None => "nothing is visible".to_owned(),
-        excess => format!("false positives {} %", text::rate(excess, 100.0)),
-    }
+    format!("false positives {} %", text::rate(point.excess, 100.0))
+}
+
+/// The first of some points in order of time, and its name with those as fast.
+fn first<'p>(mut points: impl Iterator<Item = &'p Point>) -> Option<(&'p Point, String)> {
+    let first = points.next()?;
+    let others: Vec<String> = points.filter(|p| !first.is_faster(p)).map(named).collect();
+    Some((first, named(first) + &ties(&others)))
 }
 
 fn of_points(p: &Precision) -> Vec<String> {
-    let mut sound = p.points.iter().filter(is_safe);
-    let Some(fastest) = sound.clone().next() else {
+    if visible(p) == Some(0) {
+        return vec![BLIND.to_owned()];
+    }
+    let sound = p.points.iter().filter(is_safe);
+    let Some((fastest, name)) = first(sound.clone()) else {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
     };
-    let (name, time) = (named(fastest), text::time_plus_minus(fastest.time));
+    let time = text::time_plus_minus(fastest.time);
     let mut all = vec![format!(
         "Fastest point that cannot miss an item: {name} at {time}, {}.",
         extras(fastest)
     )];
     let extra = |point: &Point| point.counts.map(|errors| errors.false_positives);
-    let tight = sound.find(|point| extra(point) < extra(fastest));
-    if let Some(tight) = tight {
-        let both = tight.query_ns().zip(fastest.query_ns());
-        let times = text::significant(both.map_or(f64::NAN, |(a, b)| a / b));
-        let (name, extra) = (named(tight), extras(tight));
+    let tight = sound.clone().filter(|point| extra(point) < extra(fastest));
+    if let Some((tight, name)) = first(tight) {
+        let times = tight.query_ns().zip(fastest.query_ns()).map(|(a, b)| a / b);
+        let times = times.filter(|_| fastest.is_faster(tight)).map(significant);
+        let longer = times.map_or("no longer".to_owned(), |times| {
+            format!("{times} times as long or more")
+        });
+        let extra = extras(tight);
         all.push(format!(
-            "Fewer false positives take {times} times as long or more: {name}, {extra}."
+            "Fewer false positives take {longer}: {name}, {extra}."
         ));
     }
     let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
@@ -141,26 +159,21 @@ fn of_points(p: &Precision) -> Vec<String> {
             None => "No point missed a visible item on these cameras.".to_owned(),
         },
     );
+    let memory = |point: &Point| point.memory_bytes_per_item;
+    let least = sound.clone().map(memory).fold(f64::INFINITY, f64::min);
+    // The fastest of those within 1 % of the least memory.
+    let small = sound.filter(|point| memory(point) <= 1.01 * least);
+    all.extend(first(small).map(|(small, name)| {
+        let (bytes, extra) = (significant(memory(small)), extras(small));
+        let time = text::some(small.query_ns(), text::time);
+        format!("Least memory: {name} at {bytes} B/item, {extra}, {time}.")
+    }));
     all
 }
 
 /// Returns true if the structure itself is wrong, so that its errors are unknown.
 pub fn is_wrong(point: &Point) -> bool {
     matches!(point.status, Status::Wrong | Status::Panicked)
-}
-
-fn of_storage(p: &Precision) -> Option<String> {
-    let memory = |point: &Point| point.memory_bytes_per_item;
-    let mut sound = p.points.iter().filter(is_safe);
-    let least = sound.clone().map(memory).min_by(f64::total_cmp)?;
-    // The fastest of those within 1 % of the least memory.
-    let least = sound.find(|point| memory(point) <= 1.01 * least)?;
-    let (name, bytes) = (named(least), text::significant(memory(least)));
-    let extra = extras(least);
-    let time = text::some(least.query_ns(), text::time);
-    Some(format!(
-        "Least memory: {name} at {bytes} B/item, {extra}, {time}."
-    ))
 }
 
 fn of_sizes(rows: &[SweepRow]) -> Option<String> {
@@ -237,12 +250,10 @@ pub fn figure(p: &Precision) -> Option<Figure> {
 ///
 /// With `all` also the errors of every culling and the sweeps.
 fn tables(p: &Precision, all: bool, room: usize) -> Vec<Block> {
-    let visible = p.points.iter().find_map(|point| point.counts);
-    let visible = visible.map_or(0, |errors| errors.visible);
     let items = text::items(p.items, p.skipped_items);
     let cameras = text::counted(p.cameras, "camera");
     let rounds = text::counted(p.rounds, "round");
-    let visible = text::count(visible as usize);
+    let visible = text::count(visible(p).unwrap_or_default() as usize);
     let over = text::over(p.processes, p.twin.as_ref());
     let head = format!(
         "{}: {items}; {}: {cameras}, {visible} visible in all; {over}; {rounds} in each",
@@ -418,6 +429,50 @@ fn swept_errors(rows: &[&SweepRow]) -> (Table, String) {
 mod tests {
     use super::*;
     use crate::precision::sweep;
+    use crate::statistics::Estimate;
+    use crate::verify::ErrorCount;
+
+    #[test]
+    fn the_fastest_is_named_with_its_ties_and_none_where_nothing_is_visible() {
+        let point = |structure: &str, extra, ns: f64, noise: f64| {
+            let mut point = Point::default();
+            structure.clone_into(&mut point.structure);
+            (point.time, point.memory_bytes_per_item) = (Some(Estimate::exact(ns)), ns);
+            point.counts = Some(ErrorCount {
+                visible: 9,
+                false_positives: extra,
+                ..ErrorCount::default()
+            });
+            point.ln_ns = [0.0, 0.1, 0.2].map(|speed| ns.ln() + speed).to_vec();
+            point.ln_ns[1] += noise;
+            point.names = Names::of(&crate::culling::Culling::default());
+            point
+        };
+        let mut p = Precision::default();
+        p.points.extend([
+            point("bvh", 3, 10.0, 0.0),
+            point("bsp", 3, 10.1, 0.5),
+            point("wide", 2, 10.2, 0.5),
+            point("linear", 2, 40.0, 0.0),
+        ]);
+        let starts = |p: &Precision, n: usize, start: &str| {
+            let told = &conclusions(p)[n];
+            assert!(told.starts_with(start), "{told}");
+        };
+        let fastest = "Fastest point that cannot miss an item: bvh with six-plane f32 c=8";
+        starts(&p, 0, &format!("{fastest} (a tie with bsp"));
+        starts(&p, 1, "Fewer false positives take no longer: wide with");
+        let least = "Least memory: bvh with six-plane f32 c=8 (a tie with bsp";
+        starts(&p, 3, least);
+        p.points.drain(1..3);
+        starts(&p, 0, &format!("{fastest} at"));
+        let longer = "Fewer false positives take 4.00 times as long or more: linear";
+        starts(&p, 1, longer);
+        for point in &mut p.points {
+            point.counts = Some(ErrorCount::default());
+        }
+        assert_eq!(conclusions(&p), [BLIND]);
+    }
 
     #[test]
     fn what_nothing_missed_means_is_the_largest_bound() {
@@ -426,20 +481,18 @@ mod tests {
         assert_ne!(first, last);
         for (row, bound) in rows.iter_mut().zip([2.0, 1.0].into_iter().cycle()) {
             let misses = u64::from(row.names == last);
-            row.errors = Some(crate::verify::ErrorCount {
+            row.errors = Some(ErrorCount {
                 false_negatives: misses,
                 ..Default::default()
             });
-            row.false_negative_ppm = Some(crate::statistics::Estimate {
+            row.false_negative_ppm = Some(Estimate {
                 value: misses as f64,
                 lower: None,
                 upper: Some(bound + 9.0 * misses as f64),
             });
         }
         let (_, told) = swept_errors(&rows.iter().collect::<Vec<_>>());
-        assert!(
-            told.starts_with("Nothing missed (below 2.00 ppm): "),
-            "{told}"
-        );
+        let wanted = "Nothing missed (below 2.00 ppm): ";
+        assert!(told.starts_with(wanted), "{told}");
     }
 }

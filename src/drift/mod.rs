@@ -12,7 +12,9 @@ mod rotation;
 use serde::Serialize;
 
 pub use arm::ArmKind;
-pub use arm_study::{ARM_TOLERANCE, ArmChoice, ArmPoint, RATE_HZ, SECONDS, Stability};
+pub use arm_study::{
+    ARM_TOLERANCE, ArmChoice, ArmPoint, RATE_HZ, SECONDS, STARTS, SUBSTEPS, Stability,
+};
 pub use bases::STEADY;
 pub use recommendation::Recommendation;
 

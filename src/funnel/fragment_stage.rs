@@ -17,9 +17,11 @@ use super::visible_items::{Errors, VisibleItems, count_items};
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
-use crate::visibility::Rays;
-use crate::visibility::fragment::{AlphaMasks, Canvas, Drawn, FragmentCounts, Screen, Tests};
+use crate::visibility::fragment::{
+    AlphaMasks, Canvas, Drawable, Drawn, FragmentCounts, Screen, Tests,
+};
 use crate::visibility::truth::{Facet, SolidBox};
+use crate::visibility::{Rays, SampleGrid};
 
 /// Samples and fragments of a test, as means per view.
 pub type MeanCounts = FragmentCounts<f64>;
@@ -53,11 +55,33 @@ pub struct FragmentStage<'w> {
 
 /// Geometry of each view, and the reused memory of an image.
 enum Geometry<'w> {
-    Boxes(Vec<BoxView>, RefCell<Option<(Canvas, Drawn)>>),
-    Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
+    Boxes(Vec<BoxView>, Image<SolidBox>),
+    Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, Image<Facet>),
 }
 
-type TriangleImage = RefCell<Option<(Canvas<Facet>, Drawn<Facet>)>>;
+/// Memory of an image, allocated at the first view.
+struct Image<B: Drawable>(RefCell<Option<(Canvas<B>, Drawn<B>)>>);
+
+impl<B: Drawable> Image<B> {
+    /// Draws a view about an origin; returns the items in front at any sample.
+    fn redraw(
+        &self,
+        (rays, grid, origin): (&Rays, SampleGrid, DVec3),
+        draw: impl FnOnce(&Canvas<B>, &mut Drawn<B>),
+    ) -> (Vec<ItemId>, FragmentCounts) {
+        let image = &mut *self.0.borrow_mut();
+        let new = || {
+            (
+                Canvas::about(rays, grid, origin),
+                Drawn::new(grid.samples()),
+            )
+        };
+        let (canvas, drawn) = image.get_or_insert_with(new);
+        canvas.set_camera(rays);
+        draw(canvas, drawn);
+        (drawn.visible(canvas), drawn.counts)
+    }
+}
 
 impl Geometry<'_> {
     /// Rejects a view that covers too many samples.
@@ -91,12 +115,12 @@ impl<'w> FragmentStage<'w> {
         let geometry = match &setup.shape {
             Shape::Boxes(solids) => {
                 let of = |view| {
-                    let listed = stages.listed(view);
-                    let bodies: Vec<_> = SolidBox::some(&solids.boxes, &listed).collect();
+                    let listed = stages.remaining(view);
+                    let bodies: Vec<_> = SolidBox::some(&solids.boxes, listed).collect();
                     let pass = PortalPass::of(setup, setup.rays(view), &bodies);
                     BoxView { bodies, pass }
                 };
-                Geometry::Boxes(setup.views().map(of).collect(), RefCell::new(None))
+                Geometry::Boxes(setup.views().map(of).collect(), Image(RefCell::new(None)))
             }
             Shape::Triangles(surfaces) => {
                 let beyond = surfaces.of_item.get(setup.items()..).unwrap_or_default();
@@ -105,7 +129,7 @@ impl<'w> FragmentStage<'w> {
                     triangles.extend(beyond.iter().flat_map(Clone::clone));
                     triangles
                 });
-                Geometry::Triangles(surfaces, triangles.collect(), RefCell::new(None))
+                Geometry::Triangles(surfaces, triangles.collect(), Image(RefCell::new(None)))
             }
         };
         FragmentStage {
@@ -118,36 +142,23 @@ impl<'w> FragmentStage<'w> {
     /// Draws a view with a test; appends the items in front at any sample.
     fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> FragmentCounts {
         let (rays, grid) = (self.setup.rays(view), self.setup.samples);
-        match &self.geometry {
+        let (visible, counts) = match &self.geometry {
             Geometry::Boxes(views, image) => {
-                let new = || {
-                    let canvas = Canvas::about(rays, grid, DVec3::ZERO);
-                    (canvas, Drawn::new(grid.samples()))
-                };
-                let image = &mut *image.borrow_mut();
-                let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.set_camera(rays);
                 let surfaces = self.setup.cut_outs.as_ref().filter(|_| test != Z);
-                views[view].draw(test, surfaces, canvas, drawn);
-                out.extend(drawn.visible(canvas));
-                drawn.counts
+                image.redraw((rays, grid, DVec3::ZERO), |canvas, drawn| {
+                    views[view].draw(test, surfaces, canvas, drawn);
+                })
             }
             Geometry::Triangles(surfaces, views, image) => {
-                let new = || {
-                    let canvas = Canvas::about(rays, grid, surfaces.origin);
-                    (canvas, Drawn::new(grid.samples()))
-                };
-                let image = &mut *image.borrow_mut();
-                let (canvas, drawn) = image.get_or_insert_with(new);
-                canvas.set_camera(rays);
-                drawn.draw_triangles(canvas, surfaces, &views[view]);
-                // Floors and ceilings of a map follow its items.
-                let items = self.setup.items() as ItemId;
-                let visible = drawn.visible(canvas).into_iter();
-                out.extend(visible.filter(|item| *item < items));
-                drawn.counts
+                image.redraw((rays, grid, surfaces.origin), |canvas, drawn| {
+                    drawn.draw_triangles(canvas, surfaces, &views[view]);
+                })
             }
-        }
+        };
+        // Floors and ceilings of a map follow its items.
+        let items = self.setup.items() as ItemId;
+        out.extend(visible.into_iter().filter(|item| *item < items));
+        counts
     }
 
     /// Rows of the stage: `none`, and the tests to be drawn.
@@ -184,10 +195,10 @@ impl<'w> FragmentStage<'w> {
                 let given = stages.remaining(view);
                 let mut output = Vec::new();
                 match back_end.name {
-                    NONE => output.extend_from_slice(&setup.listed(given)),
+                    NONE => output.extend_from_slice(given),
                     test => drawn.push(self.draw(test, view, &mut output)),
                 }
-                counts.push(count_items(given, setup.items(), &output, &truth[view]));
+                counts.push(count_items(given, &output, &truth[view]));
             }
             (back_end, Errors::of(&counts), drawn)
         });

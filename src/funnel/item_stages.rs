@@ -1,7 +1,7 @@
 //! Stages of whole items: their back ends, and the items that chains leave.
 
-use std::borrow::Cow;
 use std::cell::RefCell;
+use std::rc::Rc;
 
 use super::setup::{PathView, Setup};
 use super::stage::{Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
@@ -86,16 +86,19 @@ pub struct ItemStages<'w> {
     /// Steps of the chain, whose items remain.
     steps: Vec<Step>,
     /// Ascending ids for each view, keyed by the steps that leave them.
-    outputs: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
+    ///
+    /// First those of no steps: all items.
+    outputs: Vec<(Vec<Step>, Vec<Rc<[ItemId]>>)>,
 }
 
 impl<'w> ItemStages<'w> {
     /// Runs a chain and all chains that differ from it in one stage.
     pub fn all(setup: &'w Setup<'w>, chain: &Chain) -> ItemStages<'w> {
+        let every: Rc<[ItemId]> = (0..setup.items() as ItemId).collect();
         let mut all = ItemStages {
             setup,
             steps: chain.steps(),
-            outputs: Vec::new(),
+            outputs: vec![(Vec::new(), vec![every; setup.views.len()])],
         };
         all.run(&chain.steps());
         for stage in StageKind::OF_ITEMS {
@@ -119,68 +122,64 @@ impl<'w> ItemStages<'w> {
         }
         self.run(before);
         let run = self.setup.run(*stage, name, before);
+        let input = self.input(before);
         let output = self.setup.views().map(|view| {
             let mut ids = Vec::new();
-            run(view, self.items(before, view), &mut ids);
+            run(view, input.map(|outputs| &outputs[view][..]), &mut ids);
             ids.sort_unstable();
-            ids
+            ids.into()
         });
         let output = output.collect();
         self.outputs.push((steps.to_vec(), output));
     }
 
-    /// Items of each view after some steps; `None` means all items (no steps).
-    fn after(&self, steps: &[Step]) -> Option<&[Vec<ItemId>]> {
+    /// Items of each view after some steps.
+    fn after(&self, steps: &[Step]) -> &[Rc<[ItemId]>] {
         let found = self.outputs.iter().find(|(own, _)| own == steps);
-        let outputs = found.map(|(_, outputs)| &outputs[..]);
-        assert!(outputs.is_some() || steps.is_empty(), "steps that were run");
-        outputs
+        &found.expect("steps that were run").1
     }
 
-    /// Items of a view after some steps; `None` means all items (no steps).
-    pub fn items(&self, steps: &[Step], view: usize) -> Option<&[ItemId]> {
-        self.after(steps).map(|outputs| &outputs[view][..])
+    /// Input of what follows some steps; `None` (all items) after none.
+    fn input(&self, before: &[Step]) -> Option<&[Rc<[ItemId]>]> {
+        (!before.is_empty()).then(|| self.after(before))
     }
 
-    /// Remaining items of a view; `None` means all items.
-    pub fn remaining(&self, view: usize) -> Option<&[ItemId]> {
+    /// Items of a view after some steps.
+    pub fn items(&self, steps: &[Step], view: usize) -> &[ItemId] {
+        &self.after(steps)[view]
+    }
+
+    /// Remaining items of a view.
+    pub fn remaining(&self, view: usize) -> &[ItemId] {
         self.items(&self.steps, view)
-    }
-
-    /// Ids of the remaining items of a view.
-    pub fn listed(&self, view: usize) -> Cow<'_, [ItemId]> {
-        self.setup.listed(self.remaining(view))
     }
 
     /// Mean number of items per view that a chain leaves.
     pub fn mean_count(&self, chain: &Chain) -> f64 {
-        let steps = chain.steps();
-        let sets = self.setup.views().map(|view| self.items(&steps, view));
-        let counts = sets.map(|set| set.map_or(self.setup.items(), <[ItemId]>::len) as f64);
-        counts.sum::<f64>() / self.setup.views.len().max(1) as f64
+        let outputs = self.after(&chain.steps());
+        let counts = outputs.iter().map(|outputs| outputs.len() as f64);
+        counts.sum::<f64>() / outputs.len().max(1) as f64
     }
 
     /// Counts of the last of some steps in each view.
     pub fn counts(&self, before: &[Step], steps: &[Step], truth: &VisibleItems) -> Vec<ViewCounts> {
-        let views = self.setup.views();
-        let count = |view: usize| {
-            let output = self.setup.listed(self.items(steps, view));
-            let input = self.items(before, view);
-            count_items(input, self.setup.items(), &output, &truth[view])
-        };
-        views.map(count).collect()
+        let both = self.after(before).iter().zip(self.after(steps));
+        let counts = both
+            .zip(truth)
+            .map(|((input, output), seen)| count_items(input, output, seen));
+        counts.collect()
     }
 
     /// Tasks of all steps that were run.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
-        self.outputs.iter().map(|(steps, _)| {
-            let ((stage, name), before) = steps.split_last().expect("at least one step");
+        self.outputs.iter().filter_map(|(steps, _)| {
+            let ((stage, name), before) = steps.split_last()?;
             let run = self.setup.run(*stage, name, before);
-            let input = self.after(before);
+            let input = self.input(before);
             let ask: Ask = Box::new(move |view, out| {
                 run(view, input.map(|outputs| &outputs[view][..]), out);
             });
-            (FunnelKey::Steps(steps.clone()), ask)
+            Some((FunnelKey::Steps(steps.clone()), ask))
         })
     }
 
@@ -238,10 +237,11 @@ impl PlanView {
     }
 }
 
-/// Outcome of an item, from the ascending ids after each stage (`None`: all items).
-fn outcome(item: ItemId, sets: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> ItemOutcome {
-    let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
-    let removed = sets.iter().find(|(_, set)| lacks(set));
+/// Outcome of an item, from the ascending ids after each stage.
+fn outcome(item: ItemId, outputs: &[(StageKind, &[ItemId])], is_visible: bool) -> ItemOutcome {
+    let removed = outputs
+        .iter()
+        .find(|(_, set)| set.binary_search(&item).is_err());
     match (removed, is_visible) {
         (Some(_), true) => ItemOutcome::Lost,
         (Some((stage, _)), false) => ItemOutcome::Removed(*stage),
@@ -256,10 +256,10 @@ mod tests {
 
     #[test]
     fn the_first_stage_that_lacks_an_item_removed_it() {
-        let sets: [(StageKind, Option<&[ItemId]>); 3] = [
-            (StageKind::Region, None),
-            (StageKind::Object, Some(&[1, 2, 3])),
-            (StageKind::Occlusion, Some(&[1, 3])),
+        let sets: [(StageKind, &[ItemId]); 3] = [
+            (StageKind::Region, &[1, 2, 3, 7]),
+            (StageKind::Object, &[1, 2, 3]),
+            (StageKind::Occlusion, &[1, 3]),
         ];
         let of = |item, is_visible| outcome(item, &sets, is_visible);
         assert_eq!(of(1, true), ItemOutcome::Visible);

@@ -112,28 +112,25 @@ impl<'w> Picks<'w> {
         let bodies = all.all.len();
         for row in Bodies::<B>::BACK_ENDS {
             if row.name == "linear" && bodies > MOST_FOR_LOOP {
-                let row = too_many(row.name, bodies, one, "for each ray");
-                self.left_out.push(row);
+                self.leave_out(row.name, bodies, one, "for each ray");
                 continue;
             }
             let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.setup.kernel));
-            let declared = |question| PickRow {
-                question,
-                name: row.name.to_owned(),
-                summary: row.summary,
-                guarantee: row.guarantee,
-                ..PickRow::default()
-            };
-            let same = pick.clone();
-            let first: PickAnswer = Box::new(move |cursor, out| {
-                out.extend(pick.first(&cursor.ray));
-            });
-            let nearest: PickAnswer = Box::new(move |cursor, out| {
-                same.nearest(&cursor.ray, NEAREST, out);
-            });
-            let first = (declared(PickQuestion::First), first);
-            let nearest = (declared(PickQuestion::Nearest), nearest);
-            self.pickers.extend([first, nearest]);
+            for question in [PickQuestion::First, PickQuestion::Nearest] {
+                let pick = pick.clone();
+                let answer: PickAnswer = Box::new(move |cursor, out| match question {
+                    PickQuestion::First => out.extend(pick.first(&cursor.ray)),
+                    _ => pick.nearest(&cursor.ray, NEAREST, out),
+                });
+                let declared = PickRow {
+                    question,
+                    name: row.name.to_owned(),
+                    summary: row.summary,
+                    guarantee: row.guarantee,
+                    ..PickRow::default()
+                };
+                self.pickers.push((declared, answer));
+            }
         }
         self.pickers.sort_by_key(|(row, _)| row.question);
     }
@@ -145,8 +142,7 @@ impl<'w> Picks<'w> {
             let is_loop = spec.row.info.kind == Kind::Scan;
             if is_loop && setup.items() > MOST_FOR_LOOP {
                 let when = "for each cursor's frustum";
-                let row = too_many(&spec.label, setup.items(), "item", when);
-                self.left_out.push(row);
+                self.leave_out(&spec.label, setup.items(), "item", when);
                 continue;
             }
             let through: PickAnswer = Box::new(move |cursor, out| {
@@ -163,6 +159,13 @@ impl<'w> Picks<'w> {
             };
             self.pickers.push((declared, through));
         }
+    }
+
+    /// Leaves out a linear search over too many bodies.
+    fn leave_out(&mut self, name: &str, bodies: usize, one: &str, when: &str) {
+        let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
+        let reason = format!("{found} to test {when}; expected at most {most}");
+        self.left_out.push(LeftOutRow::new("picks", name, reason));
     }
 
     /// Tasks of all rows; a task answers all cursors of a view in turn.
@@ -222,13 +225,6 @@ impl<'w> Picks<'w> {
             in_planes,
         }
     }
-}
-
-/// Left-out row of a linear search.
-fn too_many(name: &str, bodies: usize, one: &str, when: &str) -> LeftOutRow {
-    let (found, most) = (counted(bodies, one), count(MOST_FOR_LOOP));
-    let reason = format!("{found} to test {when}; expected at most {most}");
-    LeftOutRow::new("picks", name, reason)
 }
 
 /// Cursors at the cell centres of a grid over the image.

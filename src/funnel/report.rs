@@ -11,7 +11,7 @@ use super::task::FunnelKey;
 use super::visible_items::Errors;
 use crate::measure::OverProcesses;
 use crate::shown::{counted, significant, time};
-use crate::statistics::{ALPHA, Estimate, centre, flat, ratio, trimmed_mean};
+use crate::statistics::{Estimate, about, centre, flat, ratio};
 use crate::visibility::MapSelection;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::occluders::{BlockStats, GroundStats, InnerBoxStats};
@@ -179,7 +179,8 @@ pub struct Gain {
     pub without_count: f64,
     /// Extra time / removed candidates: the least draw cost for which the stage pays.
     ///
-    /// 0 if it saves time as well; null if it removes nothing or has no time.
+    /// 0 if it saves time as well; null if it removes nothing or all, or has no time.
+    /// The interval includes the machine's speed, as that of a time does.
     #[serde(flatten, serialize_with = "flat::break_even_ns")]
     pub break_even: Option<Estimate>,
     /// Time with the stage / time without it.
@@ -215,30 +216,30 @@ impl Gain {
     }
 
     pub(super) fn set(&mut self, times: &OverProcesses<FunnelKey>) {
+        let speeds = times.speeds();
+        let steady = |ns: &[f64]| {
+            let ns = ns.iter().zip(&speeds).map(|(ns, speed)| ns * speed);
+            centre(&Vec::from_iter(ns))
+        };
         let [with, without] = self.tasks.each_ref().map(|tasks| sums(times, tasks));
-        (self.with_ns, self.without_ns) = (centre(&with), centre(&without));
-        let logs = |ns: &[f64]| -> Vec<f64> { ns.iter().map(|ns| ns.ln()).collect() };
-        let [own, other] = [logs(&with), logs(&without)];
+        (self.with_ns, self.without_ns) = (steady(&with), steady(&without));
+        let logs = |ns: &Vec<f64>| Vec::from_iter(ns.iter().map(|ns| ns.ln()));
+        let [own, other] = [&with, &without].map(logs);
         self.ratio = ratio(&other, &own, &other);
         let removed = self.removed();
-        if removed > 0.0 {
+        if removed > 0.0 && self.with_count > 0.0 {
             let costs = with.iter().zip(&without).map(|(a, b)| (a - b) / removed);
             let costs: Vec<f64> = costs.collect();
-            let interval = trimmed_mean(&costs).map(|cost| cost.interval(1.0 - ALPHA));
-            self.break_even = centre(&costs).map(|ns| Estimate {
-                value: ns.max(0.0),
-                lower: interval.map(|(lower, _)| lower.max(0.0)),
-                upper: interval.map(|(_, upper)| upper.max(0.0)),
-            });
+            self.break_even = steady(&costs).map(|ns| about(ns, &costs).map(|ns| ns.max(0.0)));
         }
     }
 }
 
-/// Summed times of some tasks in each process, ns.
+/// Summed times of some tasks as measured in each process, ns.
 ///
 /// 0 without tasks; empty if one of them has no times.
 fn sums(times: &OverProcesses<FunnelKey>, tasks: &[FunnelKey]) -> Vec<f64> {
-    let logs: Vec<Vec<f64>> = tasks.iter().map(|key| times.ln_ns(key)).collect();
+    let logs: Vec<&[f64]> = tasks.iter().map(|key| times.own(key)).collect();
     let sum = |process: usize| {
         let parts = logs.iter().map(|own| own.get(process).map(|ln| ln.exp()));
         parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
@@ -279,6 +280,8 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences
 }
 
+const UNBOXED: &str = ": no box is found inside of a closed one, so none is an occluder";
+
 /// Sentence on a stage; a stage that loses visible items saves nothing.
 ///
 /// `None` for the depth test, which costs a GPU next to nothing.
@@ -288,9 +291,8 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String>
     }
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
     let unit = gain.unit.trim_end_matches('s');
-    let mut chosen = stages.iter().filter(|row| row.is_chosen);
-    let own = chosen.find(|row| row.back_end.stage == gain.stage);
-    let errors = own.map(|row| &row.errors);
+    let is_own = |row: &&StageRow| row.is_chosen && row.back_end.stage == gain.stage;
+    let errors = stages.iter().find(is_own).map(|row| &row.errors);
     if let Some(errors) = errors.filter(|errors| errors.false_negative_count > 0.0) {
         return Some(format!(
             "{what} removes {} {} per view, {} of them visible.",
@@ -305,11 +307,7 @@ fn of_gain(gain: &Gain, stages: &[StageRow], none_boxed: bool) -> Option<String>
         (None, _) if gain.removed() > 0.0 => return None,
         // Items may be hidden even if no occluder is found to hide them.
         (None, Some(hidden)) if hidden > 0.0 => {
-            let why = [
-                "",
-                ": no box is found inside of a closed one, so none is an occluder",
-            ];
-            let why = why[usize::from(none_boxed)];
+            let why = if none_boxed { UNBOXED } else { "" };
             let hidden = significant(hidden);
             let left = format!("{hidden} of the items left are in front at no sample");
             format!("{what} removes nothing, though {left}{why}.")
@@ -360,6 +358,27 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::ProcessTimes;
+
+    /// The first task is the reference of all others; its own spread is not zero.
+    #[test]
+    fn a_break_even_spreads_as_the_time_of_its_stage() {
+        let key = FunnelKey::Stage(StageKind::Object, "wide".to_owned());
+        let process = |n: usize| ProcessTimes {
+            ln_ns: vec![Ok(Some(5.0 + [0.0, 0.02, 0.05][n % 3]))],
+            ..ProcessTimes::default()
+        };
+        let processes: Vec<ProcessTimes> = (0..10).map(process).collect();
+        let times = OverProcesses::keyed(vec![key.clone()], &processes);
+        let named = ("wide", "items");
+        let mut gain = Gain::new(StageKind::Object, named, [2.0, 4.0], [vec![key], vec![]]);
+        gain.set(&times);
+        let time = times.ns(&gain.tasks[0][0]).expect("a time").per(2.0);
+        let found = gain.break_even.expect("a cost");
+        assert!((found.value / time.value - 1.0).abs() < 1e-12);
+        let width = |of: Estimate| of.ends().map_or(f64::NAN, |[lower, upper]| upper - lower);
+        assert!((width(found) / width(time) - 1.0).abs() < 0.01, "{found:?}");
+    }
 
     #[test]
     fn noise_makes_no_advice_unconditional() {

@@ -1,6 +1,5 @@
 //! Scene, views and structures of a study, built once for all back ends.
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -14,7 +13,6 @@ use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Setting, WorkloadError, input_of};
 use crate::path::evenly;
-use crate::query::ItemId;
 use crate::scene::{self, ItemShape, LoadOptions, Scene, Surfaces, WorldBox};
 use crate::shown::{counted, significant};
 use crate::visibility::fragment::{self, CutOuts};
@@ -202,14 +200,6 @@ impl<'a> Setup<'a> {
     /// Number of items.
     pub fn items(&self) -> usize {
         self.scene.items.len()
-    }
-
-    /// Ids of a set; `None` means all items.
-    pub fn listed<'i>(&self, items: Option<&'i [ItemId]>) -> Cow<'i, [ItemId]> {
-        match items {
-            Some(items) => items.into(),
-            None => (0..self.items() as ItemId).collect::<Vec<_>>().into(),
-        }
     }
 
     /// Occluders valid for a view.
@@ -409,6 +399,7 @@ mod tests {
     use crate::index::Row;
     use crate::measure::Protocol;
     use crate::path::{self, LensDefaults};
+    use crate::query::ItemId;
     use crate::scene;
 
     /// Runs a structure that finds nothing, and a correct one, after a region stage.

@@ -82,9 +82,11 @@ impl BackEnd {
         }
     }
 
-    /// Back end for a row of the stage's table.
-    pub fn of<B>(stage: StageKind, row: &Row<B>) -> BackEnd {
-        BackEnd::new(stage, [row.name, row.summary], row.guarantee)
+    /// Back ends for the rows of the stage's table that a scene has.
+    fn of<B>(stage: StageKind, rows: &[Row<B>], has: impl Fn(&B) -> bool) -> Vec<BackEnd> {
+        let known = rows.iter().filter(|row| has(&row.build));
+        let known = known.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee));
+        known.collect()
     }
 }
 
@@ -210,24 +212,13 @@ pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
 pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
     let declared = [NONE, "the stage is left out"];
     let mut rows = vec![BackEnd::new(stage, declared, Guarantee::Conservative)];
-    match stage {
-        StageKind::Region => {
-            let known = region::BACK_ENDS.iter().filter(|row| (row.build)(scene));
-            rows.extend(known.map(|row| BackEnd::of(stage, row)));
-        }
-        StageKind::Object => {}
-        StageKind::Occlusion => {
-            rows.extend(OCCLUSION_ROWS.iter().map(|row| BackEnd::of(stage, row)));
-        }
-        StageKind::Triangle => {
-            rows.extend(TRIANGLE_ROWS.iter().map(|row| BackEnd::of(stage, row)));
-        }
-        StageKind::Fragment => {
-            let known = FRAGMENT_ROWS.iter();
-            let known = known.filter(|row| (row.build)(scene, has_cut_outs));
-            rows.extend(known.map(|row| BackEnd::of(stage, row)));
-        }
-    }
+    rows.extend(match stage {
+        StageKind::Region => BackEnd::of(stage, region::BACK_ENDS, |has| has(scene)),
+        StageKind::Object => Vec::new(),
+        StageKind::Occlusion => BackEnd::of(stage, OCCLUSION_ROWS, |_| true),
+        StageKind::Triangle => BackEnd::of(stage, TRIANGLE_ROWS, |_| true),
+        StageKind::Fragment => BackEnd::of(stage, FRAGMENT_ROWS, |has| has(scene, has_cut_outs)),
+    });
     rows
 }
 

@@ -68,11 +68,9 @@ impl<'w> Study<'w> {
 
     /// All timed tasks.
     fn tasks(&self) -> Vec<KeyedTask<'_>> {
-        let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
-        tasks.extend(self.triangles.tasks());
-        tasks.extend(self.fragments.tasks());
-        tasks.extend(self.picks.iter().flat_map(Picks::tasks));
-        tasks
+        let culled = self.items.tasks().chain(self.triangles.tasks());
+        let picks = self.picks.iter().flat_map(Picks::tasks);
+        culled.chain(self.fragments.tasks()).chain(picks).collect()
     }
 
     /// Rows of all stages before the fragment stage.
@@ -174,9 +172,8 @@ pub fn prepare(input: &FunnelInput, begin: &dyn Fn(&str)) -> Result<UntimedFunne
         });
     }
     let mut left_out = Vec::from_iter(left_out_of(scene));
-    if let Some(reason) = &study.fragments.too_much {
-        left_out.push(LeftOutRow::new("stages", "fragment", reason));
-    }
+    let too_much = study.fragments.too_much.iter();
+    left_out.extend(too_much.map(|reason| LeftOutRow::new("stages", "fragment", reason)));
     let mut picks = Vec::new();
     if let Some(all) = &study.picks {
         begin("picking");

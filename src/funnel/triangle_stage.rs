@@ -86,7 +86,7 @@ impl TriangleStage {
             Shape::Boxes(solids) => Err(solids),
         };
         let views = setup.views().map(|view| {
-            let items = stages.listed(view);
+            let items = stages.remaining(view);
             let camera = &setup.rays(view).camera;
             let back_ends = whole.clone().unwrap_or_else(|solids| {
                 let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);

@@ -131,29 +131,22 @@ impl ViewCounts {
     }
 }
 
-/// Counts of a stage with the given input (`None`: all `all` items) and output.
+/// Counts of a stage with the given input and output.
 ///
 /// `visible` are the visible items, each with its number of samples. All lists are ascending.
-pub fn count_items(
-    input: Option<&[ItemId]>,
-    all: usize,
-    output: &[ItemId],
-    visible: &[(ItemId, u32)],
-) -> ViewCounts {
-    let is_given = |item: &ItemId| input.is_none_or(|input| input.binary_search(item).is_ok());
-    let given = visible.iter().filter(|(item, _)| is_given(item)).count() as u64;
-    let input = input.map_or(all, <[ItemId]>::len) as u64;
+pub fn count_items(input: &[ItemId], output: &[ItemId], visible: &[(ItemId, u32)]) -> ViewCounts {
     let mut counts = ViewCounts {
-        input,
+        input: input.len() as u64,
         output: output.len() as u64,
-        truth: given,
         ..ViewCounts::default()
     };
     for &(item, samples) in visible {
         let samples = u64::from(samples);
         counts.samples += samples;
+        let is_given = input.binary_search(&item).is_ok();
+        counts.truth += u64::from(is_given);
         // A loss counts at the stage that drops the item, not at later ones.
-        if is_given(&item) && output.binary_search(&item).is_err() {
+        if is_given && output.binary_search(&item).is_err() {
             counts.false_negatives += 1;
             counts.missing_samples += samples;
             counts.worst_missing_samples = counts.worst_missing_samples.max(samples);
@@ -221,7 +214,8 @@ mod tests {
     #[test]
     fn errors_are_counted_by_item_and_by_sample() {
         let visible = [(2, 10), (5, 1), (9, 4)];
-        let counts = count_items(None, 12, &[1, 2, 3, 9], &visible);
+        let all: Vec<ItemId> = (0..12).collect();
+        let counts = count_items(&all, &[1, 2, 3, 9], &visible);
         assert_eq!((counts.false_positives(), counts.false_negatives), (2, 1));
         assert_eq!(
             (counts.missing_samples, counts.worst_missing_samples),
@@ -229,12 +223,12 @@ mod tests {
         );
         assert_eq!((counts.samples, counts.truth), (15, 3));
         // A loss at an earlier stage is not counted again.
-        let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 9], &visible);
+        let counts = count_items(&[1, 2, 3, 7, 9], &[1, 2, 9], &visible);
         assert_eq!((counts.input, counts.hidden(), counts.truth), (5, 3, 2));
         assert_eq!((counts.false_positives(), counts.false_negatives), (1, 0));
         assert_eq!((counts.samples, counts.missing_samples), (15, 0));
-        assert_eq!(count_items(None, 12, &[], &visible).false_negatives, 3);
-        assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives(), 2);
+        assert_eq!(count_items(&all, &[], &visible).false_negatives, 3);
+        assert_eq!(count_items(&all, &[1, 4], &[]).false_positives(), 2);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::borrow::Borrow;
 use serde::{Deserialize, Serialize};
 
 use super::{Part, Timed, Verdict};
-use crate::statistics::{ALPHA, Estimate, is_less, one_run, ratio};
+use crate::statistics::{Estimate, one_run, ratio};
 
 /// Times of the tasks of a schedule in one process, in the order of the schedule.
 ///
@@ -82,7 +82,8 @@ impl<K: PartialEq> OverProcesses<K> {
         self.logs.get(position)
     }
 
-    fn own(&self, task: impl Borrow<K>) -> &[f64] {
+    /// ln of the time of a task as measured in each process, ns; empty without times.
+    pub fn own(&self, task: impl Borrow<K>) -> &[f64] {
         let timed = self.log(task).and_then(|log| log.as_deref().ok());
         timed.unwrap_or_default()
     }
@@ -95,6 +96,14 @@ impl<K: PartialEq> OverProcesses<K> {
     /// Verdict of a task that failed; `None` for a sound one and for an unknown key.
     pub fn failure(&self, task: impl Borrow<K>) -> Option<&Verdict> {
         self.log(task)?.as_ref().err()
+    }
+
+    /// Speed of each process: the reported time of the first task / its own.
+    pub fn speeds(&self) -> Vec<f64> {
+        let reported = one_run(&self.reference, &self.reference);
+        let reported = reported.map_or(f64::NAN, |found| found.value);
+        let own = self.reference.iter();
+        own.map(|ln_ns| reported / ln_ns.exp()).collect()
     }
 
     /// Time of a query of a task, ns; `None` without times and for an unknown key.
@@ -119,17 +128,17 @@ impl<K: PartialEq> OverProcesses<K> {
     pub fn ratio(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> Option<Estimate> {
         ratio(&self.reference, self.own(task), self.own(other))
     }
-
-    /// Returns true if a task is significantly faster than another.
-    pub fn is_faster(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> bool {
-        is_less(&self.ln_ns(task), &self.ln_ns(other), ALPHA)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::Status;
     use super::*;
+    use crate::statistics::{ALPHA, is_less};
+
+    fn is_faster(times: &OverProcesses, task: usize, other: usize) -> bool {
+        is_less(&times.ln_ns(task), &times.ln_ns(other), ALPHA)
+    }
 
     fn process(ln_ns: [f64; 3]) -> ProcessTimes {
         ProcessTimes {
@@ -160,8 +169,8 @@ mod tests {
         assert!(high / low > 1.4 && upper / lower < 1.02);
         assert!(lower < 0.1f64.exp() && 0.1f64.exp() < upper);
         assert!(ends(c).0 <= c.value && c.value <= ends(c).1);
-        assert!(times.is_faster(0, 1) && !times.is_faster(1, 0));
-        assert!(!times.is_faster(1, 2) && !times.is_faster(2, 1));
+        assert!(is_faster(&times, 0, 1) && !is_faster(&times, 1, 0));
+        assert!(!is_faster(&times, 1, 2) && !is_faster(&times, 2, 1));
     }
 
     #[test]
@@ -170,7 +179,7 @@ mod tests {
         let found = times.ns(1).unwrap();
         assert!(found.value > 0.0 && found.lower.is_none() && found.upper.is_none());
         assert!(times.ratio(1, 0).unwrap().lower.is_none());
-        assert!(times.is_faster(2, 1) && !times.is_faster(1, 2));
+        assert!(is_faster(&times, 2, 1) && !is_faster(&times, 1, 2));
     }
 
     #[test]
@@ -185,7 +194,7 @@ mod tests {
             (None, None, None)
         );
         assert!(times.ns(0).is_some() && times.ratio(1, 0).is_none());
-        assert!(!times.is_faster(0, 1) && !times.is_faster(1, 0));
+        assert!(!is_faster(&times, 0, 1) && !is_faster(&times, 1, 0));
     }
 
     #[test]

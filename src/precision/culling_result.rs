@@ -27,7 +27,7 @@ pub struct Names {
 }
 
 impl Names {
-    pub(super) fn of(culling: &Culling) -> Names {
+    pub(crate) fn of(culling: &Culling) -> Names {
         Names {
             test: culling.test.name(),
             arithmetic: culling.arithmetic.name(),

@@ -2,42 +2,12 @@
 //!
 //! Also decides whether one point dominates another.
 
-use std::ops::Add;
-
 use serde::Serialize;
 
 use super::culling_result::{CullingResult, Names, counts_or_null};
 use crate::measure::{OverProcesses, Status, Verdict};
-use crate::statistics::{ALPHA, Estimate, dominance, flat, rate_of, shows_less};
+use crate::statistics::{ALPHA, Estimate, dominance, flat, is_less, rate_of, shows_less};
 use crate::verify::ErrorCount;
-
-/// A kind of error or cost; less is better.
-#[derive(Clone, PartialEq, Debug)]
-pub(super) struct Dimension {
-    /// Value of the point.
-    value: f64,
-    /// Value at each camera; empty for a cost without a sampling error.
-    by_camera: Vec<f64>,
-}
-
-impl Dimension {
-    /// Folds the values of all cameras into one, starting at 0.
-    pub fn of(by_camera: impl Iterator<Item = f64>, fold: fn(f64, f64) -> f64) -> Dimension {
-        let by_camera: Vec<f64> = by_camera.collect();
-        Dimension {
-            value: by_camera.iter().copied().fold(0.0, fold),
-            by_camera,
-        }
-    }
-
-    /// A cost that is independent of the cameras.
-    pub fn fixed(value: f64) -> Dimension {
-        Dimension {
-            value,
-            by_camera: Vec::new(),
-        }
-    }
-}
 
 /// A structure with a culling, its errors and its time.
 #[derive(Clone, Default, Debug, Serialize)]
@@ -75,11 +45,12 @@ pub struct Point {
     pub is_tie: bool,
     /// True if no point significantly dominates it.
     pub on_front: bool,
+    /// False negatives, dropped touches, false positives, depths, at each camera.
     #[serde(skip)]
-    dimensions: Vec<Dimension>,
-    /// Index among the points before sorting, if it has a time.
+    by_camera: [Vec<f64>; 4],
+    /// ln of the time in each process, ns; empty without times.
     #[serde(skip)]
-    task: Option<usize>,
+    pub ln_ns: Vec<f64>,
 }
 
 impl Point {
@@ -89,15 +60,14 @@ impl Point {
         let is_made = result.refused.is_none();
         let counts: ErrorCount = errors.iter().copied().sum();
         let missed = rate_of(errors, |e| [e.false_negatives, e.visible]);
-        let of = |count: fn(&ErrorCount) -> u64| {
-            Dimension::of(errors.iter().map(|e| count(e) as f64), f64::add)
+        let of = |count: fn(&ErrorCount) -> u64| -> Vec<f64> {
+            errors.iter().map(|e| count(e) as f64).collect()
         };
-        let dimensions = vec![
+        let by_camera = [
             of(|c| c.false_negatives),
             of(|c| c.touch_dropped),
             of(|c| c.false_positives),
-            Dimension::of(depths.iter().copied(), f64::max),
-            Dimension::fixed(memory_bytes_per_item),
+            depths.clone(),
         ];
         Point {
             structure: structure.to_owned(),
@@ -113,7 +83,7 @@ impl Point {
                 true => Status::Ok,
             },
             reason: result.refused.clone(),
-            dimensions,
+            by_camera,
             ..Point::default()
         }
     }
@@ -130,8 +100,13 @@ impl Point {
     pub(super) fn time(&mut self, times: &OverProcesses<(usize, bool)>, task: usize, items: usize) {
         self.accepts(times.failure((task, false)));
         self.time = times.ns((task, false));
-        self.task = self.time.map(|_| task);
+        self.ln_ns = times.ln_ns((task, false));
         self.ns_per_item = self.query_ns().map(|ns| ns / items as f64);
+    }
+
+    /// Returns true if it is significantly faster than another.
+    pub fn is_faster(&self, other: &Point) -> bool {
+        is_less(&self.ln_ns, &other.ln_ns, ALPHA)
     }
 
     /// Time per query, ns.
@@ -139,30 +114,35 @@ impl Point {
         Some(self.time?.value)
     }
 
-    /// Values of which less is better: the dimensions and the time.
-    fn values(&self) -> Vec<f64> {
-        let dimensions = self.dimensions.iter().map(|d| d.value);
-        dimensions.chain(self.query_ns()).collect()
+    /// Values of which less is better: errors, depth of misses, memory, time.
+    fn values(&self) -> [f64; 6] {
+        let counts = self.counts.unwrap_or_default();
+        [
+            counts.false_negatives as f64,
+            counts.touch_dropped as f64,
+            counts.false_positives as f64,
+            self.worst_miss_px.unwrap_or(0.0),
+            self.memory_bytes_per_item,
+            self.query_ns().unwrap_or(0.0),
+        ]
     }
 }
 
 /// Sorts the points by time, untimed ones last, and marks the front.
 ///
 /// Errors are compared camera by camera, times process by process.
-pub(super) fn sort_and_mark(points: &mut [Point], is_faster: &dyn Fn(usize, usize) -> bool) {
+pub(super) fn sort_and_mark(points: &mut [Point]) {
     let order = |p: &Point| p.query_ns().unwrap_or(f64::INFINITY);
     points.sort_by(|a, b| order(a).total_cmp(&order(b)));
     let timed = points.partition_point(|p| p.time.is_some());
-    let values: Vec<Vec<f64>> = points[..timed].iter().map(Point::values).collect();
+    let values: Vec<[f64; 6]> = points[..timed].iter().map(Point::values).collect();
     let is_less = |a: usize, b: usize, k: usize| {
         let (a, b) = (&points[a], &points[b]);
-        match (a.dimensions.get(k), b.dimensions.get(k)) {
-            (Some(a), Some(b)) if a.by_camera.is_empty() && b.by_camera.is_empty() => true,
-            (Some(a), Some(b)) => shows_less(&a.by_camera, &b.by_camera, ALPHA),
-            _ => {
-                let both = a.task.zip(b.task);
-                both.is_some_and(|(a, b)| is_faster(a, b))
-            }
+        match k {
+            0..4 => shows_less(&a.by_camera[k], &b.by_camera[k], ALPHA),
+            // Memory has no sampling error.
+            4 => true,
+            _ => a.is_faster(b),
         }
     };
     let found = dominance(&values, &is_less);
@@ -181,19 +161,21 @@ mod tests {
     ///
     /// `errors` are false negatives, dropped touches and false positives, spread evenly over four
     /// cameras.
-    fn point(errors: [f64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point {
-        let sampled = |value: f64| Dimension::of([value / 4.0; 4].into_iter(), f64::add);
-        let mut dimensions = errors.map(sampled).to_vec();
-        dimensions.push(Dimension {
-            value: depth,
-            by_camera: vec![0.0; 4],
-        });
-        dimensions.push(Dimension::fixed(memory));
+    fn point(errors: [u64; 3], depth: f64, memory: f64, ns: Option<f64>) -> Point {
+        let [missed, dropped, extra] = errors.map(|count| vec![count as f64 / 4.0; 4]);
         Point {
             structure: "linear".to_owned(),
+            counts: Some(ErrorCount {
+                false_negatives: errors[0],
+                touch_dropped: errors[1],
+                false_positives: errors[2],
+                ..ErrorCount::default()
+            }),
+            worst_miss_px: Some(depth),
+            memory_bytes_per_item: memory,
             time: ns.map(Estimate::exact),
-            dimensions,
-            task: ns.map(|ns| ns as usize),
+            by_camera: [missed, dropped, extra, vec![0.0; 4]],
+            ln_ns: ns.iter().map(|ns| (ns / 10.0).floor()).collect(),
             ..Point::default()
         }
     }
@@ -201,14 +183,14 @@ mod tests {
     /// Times differ significantly if they lie in different tens.
     fn marked(points: &[Point]) -> Vec<(Option<usize>, bool, bool)> {
         let mut points = points.to_vec();
-        sort_and_mark(&mut points, &|a, b| a / 10 < b / 10);
+        sort_and_mark(&mut points);
         let of = |p: &Point| (p.dominated_by, p.is_tie, p.on_front);
         points.iter().map(of).collect()
     }
 
     #[test]
     fn errors_are_not_traded_and_ties_share_the_front() {
-        let (none, some) = ([0.0, 0.0, 5.0], [0.0, 0.0, 9.0]);
+        let (none, some) = ([0, 0, 5], [0, 0, 9]);
         let (front, tie, worse) = (
             (None, false, true),
             (None, true, true),
@@ -222,8 +204,8 @@ mod tests {
             (some, 10.0, none, 11.0, [front, front]),
             (none, 10.0, some, 11.0, [front, worse]),
             // One kind of error more, another less: both stay, however fast.
-            ([1.0, 0.0, 0.0], 10.0, [0.0, 0.0, 9.0], 50.0, [front, front]),
-            ([0.0, 1.0, 0.0], 10.0, [0.0, 0.0, 9.0], 50.0, [front, front]),
+            ([1, 0, 0], 10.0, [0, 0, 9], 50.0, [front, front]),
+            ([0, 1, 0], 10.0, [0, 0, 9], 50.0, [front, front]),
         ];
         for (errors_a, time_a, errors_b, time_b, wanted) in cases {
             let points = [
@@ -237,12 +219,12 @@ mod tests {
 
     #[test]
     fn memory_and_the_depth_of_a_miss_are_dimensions() {
-        let (none, some) = ([0.0, 0.0, 5.0], [1.0, 0.0, 5.0]);
+        let (none, some) = ([0, 0, 5], [1, 0, 5]);
         let deep = point(some, 30.0, 24.0, Some(10.0));
         let plain = point(none, 0.0, 24.0, Some(20.0));
         let small = point(none, 0.0, 12.0, Some(90.0));
         let shallow = point(some, 0.1, 24.0, Some(95.0));
-        let untimed = point([0.0; 3], 0.0, 24.0, None);
+        let untimed = point([0; 3], 0.0, 24.0, None);
         let found = marked(&[untimed, deep, plain, small, shallow]);
         let on_front: Vec<bool> = found.iter().map(|(.., on_front)| *on_front).collect();
         assert_eq!(on_front, [true, true, true, false, false]);

@@ -273,7 +273,7 @@ impl UntimedDiagram {
         for (index, point) in points.iter_mut().enumerate() {
             point.time(&times, index, precision.items);
         }
-        sort_and_mark(points, &|a, b| times.is_faster((a, false), (b, false)));
+        sort_and_mark(points);
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
         precision.processes = processes.len();
         precision

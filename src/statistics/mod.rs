@@ -16,7 +16,7 @@ mod unpaired;
 
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean, median, quantile, sorted, two_speeds};
-pub use one_run::{Estimate, one_run, ratio, speedup};
+pub use one_run::{Estimate, about, one_run, ratio, speedup};
 pub use ranking::{ALPHA, dominance, is_less, ranks};
 pub use rate::{rate_of, shows_less};
 pub use student::slope;

@@ -63,7 +63,8 @@ impl Estimate {
         self.map(|share| share.min(1.0))
     }
 
-    fn map(self, of: impl Fn(f64) -> f64) -> Estimate {
+    /// Value and interval, each by a function that keeps their order.
+    pub fn map(self, of: impl Fn(f64) -> f64) -> Estimate {
         Estimate {
             value: of(self.value),
             lower: self.lower.map(&of),
@@ -83,9 +84,13 @@ impl Estimate {
 /// structure's own trimmed mean, centred on X + mean r: it contains the value by construction.
 pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     let middle = centre(reference)? + centre(&differences(own, reference)?)?;
+    Some(about(middle, own).map(f64::exp))
+}
+
+/// A value in an interval as wide as that of the trimmed mean of `own`.
+pub fn about(value: f64, own: &[f64]) -> Estimate {
     let margin = margin(own);
-    let ends = [middle - margin, middle + margin];
-    Some(Estimate::within(middle.exp(), ends.map(f64::exp)))
+    Estimate::within(value, [value - margin, value + margin])
 }
 
 /// Time of the reference / time of the structure: above 1 is faster.

@@ -166,6 +166,11 @@ fn the_table_says_the_same_for_people() {
     // A pipe gets no lines about the work.
     assert_eq!((done.code, done.err.as_str()), (Some(0), ""));
     let table = done.out;
+    let told = table.replace('\n', " ");
+    assert!(
+        told.contains("(1, 2, 4, 16, 64 are tried)")
+            && told.contains("started 0.8, 1, 1.2 from zero")
+    );
     let names = [METHODS, STEPPED].map(set).into_iter().flatten();
     for name in names.chain(["0.8284", "linear, k=1e6", "collision, k=1e4"]) {
         assert!(table.contains(name), "{name}");

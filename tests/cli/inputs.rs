@@ -404,6 +404,11 @@ fn doubtful_cameras_are_one_warning_each_and_recorded() {
             told.contains("Nothing is to be taken: no ") && !is_advised,
             "{told}"
         );
+        let of_gains = |line: &str| array(&json(&works(folder.path(), line)), "gains").to_vec();
+        if study != "advise" {
+            let mut gains = of_gains(&(line + " --format json")).into_iter();
+            assert!(gains.all(|gain| gain["break_even_ns"].is_null()));
+        }
     }
     let line = "advise --scene z.csv --path away.csv --structure bvh --processes 1 --format json";
     let advice = json(&cullbench(folder.path(), line).out);

@@ -249,7 +249,7 @@ fn rows_are_sorted_and_dominance_is_what_it_says() {
 }
 
 #[test]
-fn where_nothing_is_visible_no_share_is_printed() {
+fn where_nothing_is_visible_nothing_is_recommended() {
     let folder = tempfile::tempdir().expect("a folder");
     let written = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
     written(
@@ -263,7 +263,7 @@ fn where_nothing_is_visible_no_share_is_printed() {
     let line = "precision --scene b.csv --path c.csv --cubes 0 --processes 1 --structure linear";
     let out = works(folder.path(), line);
     assert!(
-        out.contains("nothing is visible") && !out.contains("positives  %"),
+        out.contains("Nothing is to be taken: no camera sees an item") && !out.contains("Fastest"),
         "{out}"
     );
 }
