@@ -80,6 +80,9 @@ impl Setup<'_> {
     }
 }
 
+/// Ascending ids of a view, which views of all items share.
+type Ids = Rc<[ItemId]>;
+
 /// Items that remain in each view after the back ends of the item stages.
 pub struct ItemStages<'w> {
     pub setup: &'w Setup<'w>,
@@ -88,13 +91,13 @@ pub struct ItemStages<'w> {
     /// Ascending ids for each view, keyed by the steps that leave them.
     ///
     /// First those of no steps: all items.
-    outputs: Vec<(Vec<Step>, Vec<Rc<[ItemId]>>)>,
+    outputs: Vec<(Vec<Step>, Vec<Ids>)>,
 }
 
 impl<'w> ItemStages<'w> {
     /// Runs a chain and all chains that differ from it in one stage.
     pub fn all(setup: &'w Setup<'w>, chain: &Chain) -> ItemStages<'w> {
-        let every: Rc<[ItemId]> = (0..setup.items() as ItemId).collect();
+        let every: Ids = (0..setup.items() as ItemId).collect();
         let mut all = ItemStages {
             setup,
             steps: chain.steps(),
@@ -134,13 +137,13 @@ impl<'w> ItemStages<'w> {
     }
 
     /// Items of each view after some steps.
-    fn after(&self, steps: &[Step]) -> &[Rc<[ItemId]>] {
+    fn after(&self, steps: &[Step]) -> &[Ids] {
         let found = self.outputs.iter().find(|(own, _)| own == steps);
         &found.expect("steps that were run").1
     }
 
     /// Input of what follows some steps; `None` (all items) after none.
-    fn input(&self, before: &[Step]) -> Option<&[Rc<[ItemId]>]> {
+    fn input(&self, before: &[Step]) -> Option<&[Ids]> {
         (!before.is_empty()).then(|| self.after(before))
     }
 
