@@ -307,7 +307,9 @@ fn far_scenes_are_moved_and_flat_ones_known() {
         advice(folder.path(), &line)
     };
     let (near, far) = (of("near.csv"), of("far.csv"));
-    assert_eq!(rule(&near, "rebasing")["decision"], "leave_out");
+    // The clock may speak for it all the same.
+    let tolerated = rule(&near, "rebasing");
+    assert!(number(tolerated, "statistic") <= number(tolerated, "threshold"));
     let rebasing = rule(&far, "rebasing");
     assert_eq!(rebasing["decision"], "keep");
     assert!(number(rebasing, "statistic") > 1e4 * number(rule(&near, "rebasing"), "statistic"));

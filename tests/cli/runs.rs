@@ -55,7 +55,7 @@ pub fn check_run(run: &Path) -> Value {
     let mut referred = 0u64;
     for (cell, row) in cells(&report).iter().zip(&summary) {
         let fields = "scene path structure kind origin params test status reason rank times metrics error \
-            left_out samples_ref";
+            answers left_out samples_ref";
         assert_eq!(keys(cell), set(fields));
         let text = |value: &Value| value.as_str().expect("text").to_owned();
         assert_eq!(cell["status"], "ok", "{cell}");
