@@ -13,7 +13,9 @@ use super::process::*;
 const MOVING: &str = "--scene city:n=400 --path orbit:frames=4 --structure linear,wide,octree-textbook \
      --motion drift:share=10%,frames=12 --views 2 --update refit,every=5 --threads 1,2";
 
-/// Advice about moving items, which cost nothing to draw: no test replaces the scan by a tree.
+/// Advice about moving items that cost nothing to draw.
+///
+/// So no test replaces the scan by a tree.
 pub fn moving() -> &'static Value {
     static OUTCOME: OnceLock<Value> = OnceLock::new();
     OUTCOME.get_or_init(|| advice(Path::new("."), &format!("advise {MOVING} --draw-ns 0")))
