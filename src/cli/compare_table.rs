@@ -388,7 +388,6 @@ impl CompareTable<'_> {
                 )
             }
         };
-        // Of many cells some exceed it by chance.
         let most = Some(1.0 + self.changes.threshold);
         let why = match undecided.iter().any(|found| found.lower > most) {
             true => " (an interval is of one cell, a verdict allows for all of them)",
