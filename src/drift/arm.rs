@@ -107,7 +107,7 @@ named! {
 pub struct ArmRun {
     pub arm: Arm,
     pub start: State,
-    pub bases: Vec<TargetLine>,
+    pub frames: Vec<TargetLine>,
     /// Length of a frame.
     pub frame_s: f64,
 }
@@ -119,11 +119,11 @@ impl ArmRun {
             ArmKind::Linear => (0.0, f64::INFINITY, 1.0),
             ArmKind::Collision => (1.0, 0.6, -1.0),
         };
-        let (frame_s, mut start, mut bases) = (1.0 / rate_hz, 0.0, Vec::new());
+        let (frame_s, mut start, mut frames) = (1.0 / rate_hz, 0.0, Vec::new());
         while start < seconds * (1.0 - 1e-9) {
             let (base, end) = (libm::sin(start), start + frame_s);
             let speed = (libm::sin(end) - base) / frame_s;
-            bases.push(TargetLine { start, base, speed });
+            frames.push(TargetLine { start, base, speed });
             start = end;
         }
         ArmRun {
@@ -134,7 +134,7 @@ impl ArmRun {
                 stop,
             },
             start: [from, 0.0],
-            bases,
+            frames,
             frame_s,
         }
     }
@@ -145,7 +145,7 @@ impl ArmRun {
     pub fn follow(&self, step: Step, count: u32, mut keep: impl FnMut(State)) {
         let h = self.frame_s / f64::from(count);
         let mut y = self.start;
-        for line in &self.bases {
+        for line in &self.frames {
             for i in 0..count {
                 y = step(&self.arm, line, h * f64::from(i), y, h);
                 if y[0] >= self.arm.stop {
@@ -158,7 +158,7 @@ impl ArmRun {
 
     /// States at the ends of all frames.
     pub fn states(&self, step: Step, count: u32) -> Vec<State> {
-        let mut states = Vec::with_capacity(self.bases.len());
+        let mut states = Vec::with_capacity(self.frames.len());
         self.follow(step, count, |y| states.push(y));
         states
     }
@@ -321,7 +321,7 @@ mod tests {
             let [x, v] = decayed(k, 1.0, rest, t);
             [a * sin + b * cos + x, a * cos - b * sin + v]
         };
-        run.bases.iter().map(at).collect()
+        run.frames.iter().map(at).collect()
     }
 
     #[test]
@@ -386,7 +386,7 @@ mod tests {
         let first = (0..states.len()).find(at_stop).expect("it is met");
         let last = (0..states.len()).rfind(at_stop).expect("it is met");
         assert!((first..=last).all(|i| at_stop(&i)) && first < 60);
-        let end = |i: usize| run.bases[i].start + run.frame_s;
+        let end = |i: usize| run.frames[i].start + run.frame_s;
         assert!(end(last) <= left + 1e-9 && end(last + 1) > left - 1e-9);
     }
 

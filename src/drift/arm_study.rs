@@ -151,12 +151,12 @@ impl ArmSetting {
 
     /// Errors of all methods and numbers of steps on this arm.
     pub fn errors(self, seconds: f64) -> Vec<ArmPoint> {
-        let chases = STARTS.map(|share| {
+        let runs = STARTS.map(|share| {
             let run = self.run(seconds);
             let start = run.start.map(|own| share * own);
             ArmRun { start, ..run }
         });
-        let all = chases.iter();
+        let all = runs.iter();
         let states = |step, substeps| all.clone().flat_map(move |own| own.states(step, substeps));
         let omega_h = self.stiffness.sqrt() / RATE_HZ;
         let truth = states(rk4_of_sine, (omega_h / REFERENCE_STEP).ceil() as u32);

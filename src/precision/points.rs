@@ -189,9 +189,10 @@ impl Subject<'_> {
 
 /// Checks and evaluates all points, and plans their timing.
 ///
-/// [`time`] and [`UntimedDiagram::conclude`] follow. Every answer is compared with the linear scan before
-/// it is timed, and the scan with the exact truth: O(cameras * items) verdicts of some 50 ns and as
-/// many plain tests for each culling. At most `most` cameras of the path are used, evenly spread.
+/// [`time`] and [`UntimedDiagram::conclude`] follow. Every answer is compared with the linear scan
+/// before it is timed, and the scan with the exact truth: O(cameras * items) verdicts of some 50 ns
+/// and as many plain tests for each culling. At most `most` cameras of the path are used, evenly
+/// spread.
 ///
 /// # Errors
 /// A structure that refuses the scene.

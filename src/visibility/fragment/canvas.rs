@@ -34,8 +34,8 @@ const SLOPE_PAD: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Widening where an edge is clipped at the near plane, relative to D.
 ///
-/// The edge's ends differ in depth by at least [`MIN_CLIP_DEPTH`] D, so the clip point is accurate to 2^20 *
-/// 16 u D. The constant is twice that.
+/// The edge's ends differ in depth by at least [`MIN_CLIP_DEPTH`] D, so the clip point is accurate
+/// to 2^20 * 16 u D. The constant is twice that.
 const CLIP_PAD: f64 = 1.0 / (1u64 << 28) as f64;
 
 /// Least depth difference of a clipped edge, relative to D.

@@ -6,9 +6,9 @@
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it enters the box,
 //! between near and far. A box that some ray enters before the near plane is not drawn. An occluder
 //! does not hide items at the same depth. The occluders of a mesh are boxes inside its items
-//! ([`OccluderTree::with_inner_boxes`]): a ray that enters one has met the surface of the item before, unless
-//! that was before the near plane. The occluders of a map are boxes in its solid space, those of a
-//! terrain boxes below the ground; neither are items.
+//! ([`OccluderTree::with_inner_boxes`]): a ray that enters one has met the surface of the item
+//! before, unless that was before the near plane. The occluders of a map are boxes in its solid
+//! space, those of a terrain boxes below the ground; neither are items.
 
 mod buffer;
 mod interleaved;

@@ -134,9 +134,9 @@ impl RegionItems {
     /// Items that touch or meet each region; both are closed.
     ///
     /// Contains the items that touch a box of the region and those that
-    /// [meet](super::RegionLocator::more_at) the region elsewhere. If regions have no height of their own
-    /// (those of a map), their boxes extend without end up and down. O(n log n) for items much
-    /// smaller than regions.
+    /// [meet](super::RegionLocator::more_at) the region elsewhere. If regions have no height of
+    /// their own (those of a map), their boxes extend without end up and down. O(n log n) for items
+    /// much smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
         let owned = (0..).zip(&graph.parts);
         let owners = owned.flat_map(|(region, parts)| parts.iter().map(move |_| region));
