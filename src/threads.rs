@@ -32,7 +32,7 @@ impl Pool {
     }
 
     /// Returns true if [`Pool::threads`] was called: else a build is single-threaded.
-    pub fn was_asked(&self) -> bool {
+    pub fn was_used(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 }

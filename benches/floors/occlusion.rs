@@ -82,18 +82,18 @@ impl Work for Alone<'_> {
 }
 
 /// Collects the rectangles of all boxes in view, block by block.
-struct Ask<'a>(
+struct QueryFn<'a>(
     &'a OccluderTree,
     &'a View<'a>,
     &'a mut Vec<(Rects, LaneMask)>,
 );
 
-impl Work for Ask<'_> {
+impl Work for QueryFn<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Ask(scene, view, asked) = self;
+        let QueryFn(scene, view, asked) = self;
         for (index, block) in scene.levels[0].blocks().iter().enumerate() {
             let admitted = block.admitted_by(isa, view.volume, view.volume.mask());
             let mut rects = Rects::default();
@@ -126,7 +126,7 @@ fn missed_by(kernel: Kernel, only_test: bool, turns: usize) -> u32 {
         let mut culling = Interleaved::new(MaskedInner::new(GRID), kernel);
         culling.cull(&occluders, &view, &mut Vec::new());
         let mut asked = Vec::new();
-        kernel.run(Ask(&occluders, &view, &mut asked));
+        kernel.run(QueryFn(&occluders, &view, &mut asked));
         views.push((view, culling, asked));
     }
 

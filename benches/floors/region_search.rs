@@ -64,7 +64,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
             index.locate((p - scene.origin).as_vec3(), out);
         };
         let exactly = |p: DVec3, out: &mut Vec<ItemId>| {
-            scene.search(&scene.sought(p), out, |p, out| index.locate(p, out));
+            scene.search(&scene.search_point(p), out, |p, out| index.locate(p, out));
         };
         for (where_, points) in &asked {
             let exact = || lap(points, &exactly);

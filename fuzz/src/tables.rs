@@ -4,7 +4,7 @@ use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{
-    LoadOptions, Scene, read_boxes_csv, read_bytes, read_obj, read_sought_boxes_csv,
+    LoadOptions, Scene, read_boxes_csv, read_bytes, read_obj, read_search_boxes_csv,
     write_boxes_csv,
 };
 use cullbench::stress::{Vector, read_vectors, replay};
@@ -59,7 +59,7 @@ pub fn boxes(bytes: &[u8]) {
 }
 
 pub fn sought(bytes: &[u8]) {
-    let Some(boxes) = read(read_sought_boxes_csv(bytes, "fuzz.csv")) else {
+    let Some(boxes) = read(read_search_boxes_csv(bytes, "fuzz.csv")) else {
         return;
     };
     for b in boxes {

@@ -11,7 +11,8 @@ use super::choice::{fastest, time_over};
 use super::tasks::is_longer;
 use crate::culling::{Culling, CullingTest};
 use crate::measure::{
-    Group, GroupPlan, Known, Part, ProcessTimes, ReportCell, SceneInfo, Subject, Workload, measure,
+    Group, GroupPlan, Part, ProcessTimes, ReferenceResults, ReportCell, SceneInfo, Subject,
+    Workload, measure,
 };
 use crate::motion::Motion;
 
@@ -84,7 +85,7 @@ struct VariedWorkload {
     /// Requested value on the axis; `reached` is the actual one.
     value: f64,
     reached: f64,
-    known: Option<Known>,
+    known: Option<ReferenceResults>,
 }
 
 /// Workloads measured in addition to the rules, the same for all processes.

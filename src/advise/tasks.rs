@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::case::Case;
 use crate::culling::CameraView;
 use crate::index::DynIndex;
-use crate::measure::{Answer, Ask, OverProcesses, TimedTask};
+use crate::measure::{Answer, OverProcesses, QueryFn, TimedTask};
 use crate::query::ItemId;
 use crate::statistics::{Estimate, flat};
 use crate::verify::ErrorCount;
@@ -21,7 +21,7 @@ pub const BASE: usize = 0;
 pub struct TaskList<'c> {
     pub case: &'c Case<'c>,
     /// Tasks, each with a flag that is true if it is compared with the truth.
-    asks: Vec<(Ask<'c>, bool)>,
+    asks: Vec<(QueryFn<'c>, bool)>,
 }
 
 /// Answers of all tasks.

@@ -24,7 +24,9 @@ use super::study::{progress, tell_progress};
 use super::{interrupt, text};
 use crate::index::{DEFAULT, Registry};
 use crate::input;
-use crate::measure::{Group, GroupKey, Known, Machine, Part, Plan, Schedule, Share, Toolchain};
+use crate::measure::{
+    Group, GroupKey, Machine, Part, Plan, ReferenceResults, Schedule, Share, Toolchain,
+};
 use crate::report::{
     Basis, Changes, ReportCell, Setting, WORK, built_differently, changes, grouped,
 };
@@ -356,7 +358,7 @@ impl Duel<'_> {
 }
 
 /// Answers and counters of a side.
-fn counted<'p>(parts: &'p [Part], key: &GroupKey) -> Option<&'p Known> {
+fn counted<'p>(parts: &'p [Part], key: &GroupKey) -> Option<&'p ReferenceResults> {
     let part = parts.iter().find(|part| part.key == *key)?;
     part.known.as_ref()
 }

@@ -232,7 +232,7 @@ pub struct LocateArgs {
     #[arg(long)]
     pub scene: String,
     #[command(flatten)]
-    pub sought: SoughtArgs,
+    pub sought: SearchArgs,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
@@ -247,7 +247,7 @@ pub struct LocateArgs {
 /// Points or boxes to search for.
 #[derive(Args, Debug)]
 #[group(required = true, multiple = false)]
-pub struct SoughtArgs {
+pub struct SearchArgs {
     /// Points CSV (x,y,z), or places: find the regions that contain each point.
     ///
     /// `places` are the camera places of the scene, such as the spawn points of a map

@@ -173,7 +173,7 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
         // A reader that has closed the pipe is no failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
-            tell!("error: {}", told_once(&error));
+            tell!("error: {}", without_repeats(&error));
             ExitCode::from(2)
         }
     }
@@ -380,7 +380,7 @@ fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {
 }
 
 /// The context first, then its causes, except those that the text already contains.
-fn told_once(error: &anyhow::Error) -> String {
+fn without_repeats(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().map(ToString::to_string) {
         if !text.contains(&cause) {
@@ -445,7 +445,7 @@ mod tests {
             .context("a")
             .unwrap_err();
         let expected = "; expected another file or folder";
-        assert_eq!(told_once(&error), format!("a: b: is full{expected}"));
+        assert_eq!(without_repeats(&error), format!("a: b: is full{expected}"));
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::report::temporary_in;
 use crate::shown::shortened;
 
 /// Longest wait before checking for a request to stop.
-const GLANCE: Duration = Duration::from_millis(20);
+const POLL_EVERY: Duration = Duration::from_millis(20);
 /// Step of a worker that has not reported any.
 const STARTING: &str = "starting";
 /// Most bytes kept of a worker's last output.
@@ -295,7 +295,7 @@ impl Workers {
         let mut worker = self.start(process, u64::from(process), job)?;
         loop {
             interrupt::check()?;
-            match worker.listen(GLANCE)? {
+            match worker.listen(POLL_EVERY)? {
                 Some(Message::Ready { .. }) => tell("started"),
                 Some(Message::Doing { structure, step }) => {
                     tell(format!("{step} {}", structure.unwrap_or_default()).trim_end());

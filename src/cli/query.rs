@@ -19,7 +19,7 @@ use crate::measure::{Answer, Workload, guarded, input_of};
 use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
-use crate::scene::{Scene, Sought, SoughtBox, available_bytes, read_sought_boxes_csv};
+use crate::scene::{Scene, SearchBox, SearchPoint, available_bytes, read_search_boxes_csv};
 use crate::threads::share;
 
 /// Value of `--points` for the camera places of the scene.
@@ -124,7 +124,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
     Ok(Ending::of(agree))
 }
 
-fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
+fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SearchPoint>> {
     if file == Path::new(PLACES) && !is_readable(file) {
         anyhow::ensure!(
             !scene.places.is_empty(),
@@ -132,16 +132,19 @@ fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
              with places, such as a map",
             scene.name
         );
-        let eyes = scene.places.iter().map(|place| scene.sought(place.eye));
+        let eyes = scene
+            .places
+            .iter()
+            .map(|place| scene.search_point(place.eye));
         return Ok(eyes.collect());
     }
     let points = read_points_csv(&read_file(file)?[..], &file.display().to_string())?.into_iter();
-    Ok(points.map(|p| scene.sought(p)).collect())
+    Ok(points.map(|p| scene.search_point(p)).collect())
 }
 
-fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
-    let boxes = read_sought_boxes_csv(&read_file(file)?[..], &file.display().to_string())?;
-    Ok(boxes.into_iter().map(|b| scene.sought_box(b)).collect())
+fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SearchBox>> {
+    let boxes = read_search_boxes_csv(&read_file(file)?[..], &file.display().to_string())?;
+    Ok(boxes.into_iter().map(|b| scene.search_box(b)).collect())
 }
 
 /// One structure's answer to one query.

@@ -25,8 +25,8 @@ use super::{
 };
 use crate::measure::{Metric, Status};
 use crate::report::{
-    Comparison, Overall, Report, RunInfo, Views, answered_otherwise, asked_otherwise, comparisons,
-    folder_of, grouped, read_report, save_page, settings, timed_otherwise, views,
+    Comparison, Overall, Report, RunInfo, Views, answer_difference, comparisons, folder_of,
+    grouped, query_difference, read_report, save_page, settings, views, work_difference,
 };
 
 pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -347,7 +347,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
             // The same name does not imply the same query.
             let differs = |cell| {
                 let pair = (cell, last?);
-                let all = [asked_otherwise, answered_otherwise, timed_otherwise];
+                let all = [query_difference, answer_difference, work_difference];
                 all.iter().find_map(|why| why(pair))
             };
             others += usize::from(sound.clone().any(|(_, cell)| differs(*cell).is_some()));

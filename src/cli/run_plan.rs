@@ -15,7 +15,7 @@ use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene};
 use crate::motion::Motion;
 use crate::path::{self, DEFAULT_PATH, LensDefaults};
-use crate::report::{KeptPart, Stream};
+use crate::report::{StoredPart, Stream};
 use crate::scene::{self, FETCHED, FETCHED_FOLDER, Fetched, every_part, split_part};
 use crate::suite::{REAL, REAL_PATHS, SUITES, Suite};
 
@@ -157,7 +157,7 @@ impl RunPlan {
     }
 
     /// Loads every scene and every path of it; they must match the parts `begun`.
-    fn check_scenes(&self, begun: &[KeptPart]) -> Result<()> {
+    fn check_scenes(&self, begun: &[StoredPart]) -> Result<()> {
         let plain = Culling::default();
         let is_plain = |culling: &Culling| {
             (culling.arithmetic, culling.planes) == (plain.arithmetic, plain.planes)

@@ -36,7 +36,7 @@ pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
     end_with_the_parent();
     match answer(registry, request) {
         Ok(()) => send(&Message::Done)?,
-        Err(error) => send(&Message::Failed(super::told_once(&error)))?,
+        Err(error) => send(&Message::Failed(super::without_repeats(&error)))?,
     }
     Ok(Ending::Ok)
 }

@@ -100,7 +100,7 @@ pub enum CameraView {
     /// Planes and a sphere per box, in f32.
     Spheres(Box<Spheres>),
     /// Planes in f64.
-    Wide(Box<ConvexVolumeF64>),
+    PlanesF64(Box<ConvexVolumeF64>),
     /// Planes in f32 about the eye.
     Relative(RelativeVolume),
 }
@@ -111,7 +111,7 @@ impl CameraView {
         match self {
             CameraView::Volume(view) => view.into(),
             CameraView::Spheres(view) => view.as_ref().into(),
-            CameraView::Wide(view) => view.as_ref().into(),
+            CameraView::PlanesF64(view) => view.as_ref().into(),
             CameraView::Relative(view) => view.into(),
         }
     }
@@ -164,7 +164,7 @@ impl Culling {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
                 planes.extend(about_scene);
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
-                Ok(CameraView::Wide(Box::new(volume)))
+                Ok(CameraView::PlanesF64(Box::new(volume)))
             }
             Arithmetic::F32Relative => {
                 let volume = camera.relative_volume(&more, self.planes.epsilon, around)?;

@@ -18,7 +18,7 @@ pub use arm_study::{
 pub use bases::STEADY;
 pub use recommendation::Recommendation;
 
-use crate::measure::{Ask, OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
+use crate::measure::{OverProcesses, ProcessTimes, Protocol, QueryFn, Schedule, TimedTask, timed};
 use crate::spec::{SpecError, parse_number, values};
 use crate::statistics::{Estimate, flat};
 use bases::{QUERIES, QUERY_STEPS, task_of};
@@ -153,7 +153,7 @@ impl DriftReport {
 /// Error of a rotation method after a number of steps, and a query for timing.
 ///
 /// The query walks [`QUERY_STEPS`] steps. The error of a basis that is lost is `None`.
-pub fn walk(name: &str, steps: u64) -> (Option<f64>, Ask<'static>) {
+pub fn walk(name: &str, steps: u64) -> (Option<f64>, QueryFn<'static>) {
     let method = METHODS.iter().find(|method| method.name == name);
     let method = method.expect("a name of the table");
     let error = Rotation::of(method, &Period::new(steps)).error();

@@ -14,7 +14,7 @@ use super::stage::{BackEnd, NONE, STENCIL, StageKind, Z, default_test};
 use super::task::{FunnelKey, KeyedTask};
 use super::triangle_stage::TriangleStage;
 use super::visible_items::{Errors, VisibleItems, count_items};
-use crate::measure::Ask;
+use crate::measure::QueryFn;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
 use crate::visibility::fragment::{
@@ -178,7 +178,7 @@ impl<'w> FragmentStage<'w> {
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         let drawn = self.tests().filter(|row| row.name != NONE);
         drawn.map(move |row| {
-            let ask: Ask = Box::new(move |view, out| {
+            let ask: QueryFn = Box::new(move |view, out| {
                 self.draw(row.name, view, out);
             });
             let key = FunnelKey::Stage(StageKind::Fragment, row.name.to_owned());

@@ -8,7 +8,7 @@ use super::stage::{Chain, NONE, OCCLUSION_ROWS, StageKind, Step};
 use super::task::{FunnelKey, KeyedTask};
 use super::visible_items::{ViewCounts, VisibleItems, count_items};
 use crate::camera::Camera;
-use crate::measure::Ask;
+use crate::measure::QueryFn;
 use crate::query::ItemId;
 use crate::visibility::occlusion;
 use crate::visibility::region::{IdSet, Scratch};
@@ -179,7 +179,7 @@ impl<'w> ItemStages<'w> {
             let ((stage, name), before) = steps.split_last()?;
             let run = self.setup.run(*stage, name, before);
             let input = self.input(before);
-            let ask: Ask = Box::new(move |view, out| {
+            let ask: QueryFn = Box::new(move |view, out| {
                 run(view, input.map(|outputs| &outputs[view][..]), out);
             });
             Some((FunnelKey::Steps(steps.clone()), ask))

@@ -13,7 +13,7 @@ use super::task::{FunnelKey, KeyedTask, PickQuestion};
 use crate::camera::Surroundings;
 use crate::geometry::ConvexVolume;
 use crate::index::Kind;
-use crate::measure::Ask;
+use crate::measure::QueryFn;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
@@ -171,7 +171,7 @@ impl<'w> Picks<'w> {
     /// Tasks of all rows; a task answers all cursors of a view in turn.
     pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
         self.pickers.iter().map(move |(row, answer)| {
-            let ask: Ask = Box::new(move |view, out| {
+            let ask: QueryFn = Box::new(move |view, out| {
                 for cursor in &self.cursors[view] {
                     answer(cursor, out);
                 }

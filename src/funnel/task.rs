@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::setup::FunnelInput;
 use super::stage::{StageKind, Step};
-use crate::measure::{Ask, ProcessTimes, StudyPlan, TimedTask};
+use crate::measure::{ProcessTimes, QueryFn, StudyPlan, TimedTask};
 
 named! {
     /// A picking query at a cursor.
@@ -38,7 +38,7 @@ pub enum FunnelKey {
 }
 
 /// Task of the timed pass; the number of ids that it appends is checked.
-pub type KeyedTask<'w> = (FunnelKey, Ask<'w>);
+pub type KeyedTask<'w> = (FunnelKey, QueryFn<'w>);
 
 /// Tasks and schedule of the timed pass, the same for all processes.
 pub type FunnelPlan = StudyPlan<FunnelKey>;
@@ -47,7 +47,7 @@ impl FunnelPlan {
     /// Runs every task once in each of `views` views and plans the timing.
     pub fn of(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
         let mut out = Vec::new();
-        let mut count = |ask: &Ask, view| {
+        let mut count = |ask: &QueryFn, view| {
             out.clear();
             ask(view, &mut out);
             out.len() as u64
@@ -63,7 +63,7 @@ impl FunnelPlan {
     ///
     /// A planned task that this process does not have fails by its counts.
     pub fn time(&self, tasks: Vec<KeyedTask>, input: &FunnelInput) -> ProcessTimes {
-        let mut asks: HashMap<FunnelKey, Ask> = tasks.into_iter().collect();
+        let mut asks: HashMap<FunnelKey, QueryFn> = tasks.into_iter().collect();
         let ask = |key: &FunnelKey| asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
         self.timed(&input.setting.protocol, ask)
     }

@@ -15,7 +15,7 @@ use super::task::{FunnelKey, KeyedTask};
 use super::visible_items::ViewCounts;
 use crate::camera::Camera;
 use crate::kernel::Kernel;
-use crate::measure::Ask;
+use crate::measure::QueryFn;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
     Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, TriangleRow, facing,
@@ -127,7 +127,7 @@ impl TriangleStage {
         let back_ends = self.views.first().map(|view| &view.back_ends.culls);
         back_ends.into_iter().flatten().map(move |(name, _)| {
             let key = FunnelKey::Stage(StageKind::Triangle, (*name).to_owned());
-            let ask: Ask = Box::new(move |view, out| {
+            let ask: QueryFn = Box::new(move |view, out| {
                 let kept = self.kept(name, view);
                 let clusters = kept.words().iter().zip(0..);
                 let left = clusters.filter(|(word, _)| **word != 0);

@@ -201,7 +201,7 @@ impl<I: Isa> Piece<I> for Doubtful<'_> {
 #[cold]
 #[inline(never)]
 fn settled<I: Isa>(isa: I, doubtful: Doubtful) -> LaneMask {
-    isa.apart(doubtful)
+    isa.run_outlined(doubtful)
 }
 
 #[cfg(test)]

@@ -241,7 +241,7 @@ impl RegionIndex for Linear {
         {
             let (isa, parts) = (cx.isa(), blocks.div_ceil(BLOCKS_PER_CALL));
             let part = |index: usize, ids: &mut Vec<ItemId>| {
-                isa.apart(PartOfScan(self, volume, index, ids));
+                isa.run_outlined(PartOfScan(self, volume, index, ids));
             };
             return in_parts(workers, parts, part, cx);
         }

@@ -28,13 +28,13 @@ pub trait Isa: Copy + Send + Sync {
     /// A set of lanes, in the form that comparisons produce.
     type Kept: Copy;
     /// Appends row after row.
-    type Packer<'a>: Pack<'a, Self>;
+    type Appender<'a>: Append<'a, Self>;
 
     /// Runs a piece in a separate function, compiled for these instructions.
     ///
     /// A loop needs a separate function to keep its values in registers.
     #[inline(always)]
-    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+    fn run_outlined<P: Piece<Self>>(self, piece: P) -> P::Output {
         piece.run(self)
     }
 
@@ -106,11 +106,11 @@ pub trait Isa: Copy + Send + Sync {
     #[inline(always)]
     fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
         // Reserve first: a register would not outlive the call that makes it.
-        Self::Packer::onto(out, 0).push(self, row, lanes);
+        Self::Appender::onto(out, 0).push(self, row, lanes);
     }
 }
 
-/// A piece of a larger work: what [`Isa::apart`] does.
+/// A piece of a larger work: what [`Isa::run_outlined`] does.
 pub trait Piece<I: Isa> {
     /// Result of the piece.
     type Output;
@@ -121,9 +121,9 @@ pub trait Piece<I: Isa> {
 
 /// Appends rows and some lanes of rows to a list.
 ///
-/// Room for all of them is reserved once; nothing is checked in between. Dropping the packer sets
+/// Room for all of them is reserved once; nothing is checked in between. Dropping the appender sets
 /// the list's length.
-pub trait Pack<'a, I: Isa> {
+pub trait Append<'a, I: Isa> {
     /// Reserves room for `words` words, and for the rest of a row behind them.
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self;
 
@@ -208,9 +208,9 @@ mod tests {
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) {
-            let mut packer = I::Packer::onto(self.0, self.1);
+            let mut appender = I::Appender::onto(self.0, self.1);
             for (row, lanes) in self.2 {
-                packer.push(isa, row, *lanes);
+                appender.push(isa, row, *lanes);
             }
         }
     }
@@ -218,7 +218,7 @@ mod tests {
     /// Words that each instruction set packs behind a 1, and whether it panicked.
     fn packed(words: usize, rows: &[([u32; LANES], LaneMask)]) -> Vec<(Vec<u32>, bool)> {
         let pack = |run: &dyn Fn(Packed)| {
-            // Enough memory, so that only the packer can refuse.
+            // Enough memory, so that only the appender can refuse.
             let mut out = Vec::with_capacity(8 * LANES);
             out.push(1);
             let work = Packed(&mut out, words, rows);
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packer_has_room_for_the_last_row_whole() {
+    fn an_appender_has_room_for_the_last_row_whole() {
         let row = std::array::from_fn(|lane| lane as u32);
         for (out, panicked) in packed(LANES + 2, &[(row, LaneMask::MAX), (row, 0b10_0100)]) {
             assert!(!panicked);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packer_that_is_full_takes_nothing_more_and_keeps_what_it_has() {
+    fn an_appender_that_is_full_takes_nothing_more_and_keeps_what_it_has() {
         for (out, panicked) in packed(LANES, &[([7; LANES], LaneMask::MAX); 3]) {
             assert!(panicked);
             assert_eq!(out[1..], [7; 2 * LANES]);

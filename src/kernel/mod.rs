@@ -25,7 +25,7 @@ use std::sync::OnceLock;
 
 pub(crate) use inlined::{each, pairs};
 pub(crate) use isa::first_lanes;
-pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
+pub use isa::{Append, Isa, LANES, LaneMask, Piece};
 pub(crate) use machine::{extend, extend_from_range, prefetch};
 pub use plain::Plain;
 

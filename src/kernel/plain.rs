@@ -3,7 +3,7 @@
 //! For any processor, for interpreters, and for the tests of the other kernels. No
 //! unsafe code.
 
-use super::isa::{Isa, LANES, LaneMask, Pack};
+use super::isa::{Append, Isa, LANES, LaneMask};
 
 /// Plain arrays.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl Isa for Plain {
     type Words = Words;
     /// All bits where a lane is dropped.
     type Kept = Words;
-    type Packer<'a> = PlainPacker<'a>;
+    type Appender<'a> = PlainAppender<'a>;
 
     #[inline(always)]
     fn load(self, row: &Floats) -> Floats {
@@ -128,17 +128,17 @@ impl Isa for Plain {
 
 /// A list with the room that was reserved for it.
 #[derive(Debug)]
-pub struct PlainPacker<'a> {
+pub struct PlainAppender<'a> {
     out: &'a mut Vec<u32>,
     room: usize,
 }
 
-impl<'a> Pack<'a, Plain> for PlainPacker<'a> {
+impl<'a> Append<'a, Plain> for PlainAppender<'a> {
     #[inline(always)]
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
         let room = words + LANES;
         out.reserve(room);
-        PlainPacker { out, room }
+        PlainAppender { out, room }
     }
 
     #[inline(always)]

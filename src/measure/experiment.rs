@@ -10,7 +10,7 @@ use super::bounds::BOUNDS;
 use super::frames::measure;
 use super::group::GroupPlan;
 use super::key::{CellKey, GroupKey};
-use super::process_result::{Known, Part, TaskSamples};
+use super::process_result::{Part, ReferenceResults, TaskSamples};
 use super::schedule::cameras_within;
 use super::{
     Machine, Notice, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
@@ -270,7 +270,7 @@ pub struct Share {
     /// Number of the process; the first, 0, counts and plans for the others.
     pub process: u32,
     /// Per group: answers and schedule of the first process; `None` in that process.
-    pub known: Vec<Option<Known>>,
+    pub known: Vec<Option<ReferenceResults>>,
     /// Per group: true if it is to be measured.
     pub wanted: Vec<bool>,
     /// True to count, check and plan without timing.

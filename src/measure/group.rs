@@ -10,7 +10,7 @@ use super::bounds::Bound;
 use super::count::{Counted, MOST_JUDGED, count_pass, judge};
 use super::index_under_test::original;
 use super::key::{GroupKey, Pass, TaskKey};
-use super::process_result::{Known, Measured, Part, SubjectPart, TaskPart};
+use super::process_result::{Measured, Part, ReferenceResults, SubjectPart, TaskPart};
 use super::schedule::scheduled;
 use super::{
     Answer, Judged, KeyedSchedule, Notice, PathInfo, Protocol, SceneInfo, Schedule, Status,
@@ -38,7 +38,7 @@ pub struct GroupPlan<'a> {
     /// Lower bounds timed beside the structures.
     pub bounds: &'a [Bound],
     /// Answers and schedules of the first process; `None` in that process.
-    pub known: Option<&'a Known>,
+    pub known: Option<&'a ReferenceResults>,
     /// True to count, check and plan without timing.
     pub plan_only: bool,
     /// True if region search is timed as well.
@@ -66,7 +66,7 @@ impl<'a> GroupPlan<'a> {
     }
 
     /// The answers of the first process, if it had any.
-    pub(super) fn answered(&self) -> Option<&'a Known> {
+    pub(super) fn answered(&self) -> Option<&'a ReferenceResults> {
         self.known.filter(|known| !known.visible.is_empty())
     }
 
@@ -79,7 +79,7 @@ impl<'a> GroupPlan<'a> {
         [visible, located]: [Vec<Answer>; 2],
         [query, locate]: [Option<KeyedSchedule>; 2],
     ) -> Part {
-        let known = self.answered().is_none().then_some(Known {
+        let known = self.answered().is_none().then_some(ReferenceResults {
             visible,
             located,
             query,
@@ -292,7 +292,7 @@ fn count<'a>(workload: &Workload, subjects: &'a [Subject], notice: Notice) -> Co
 fn compare_digests(
     subject: &Subject,
     workload: &Workload,
-    known: &Known,
+    known: &ReferenceResults,
     notice: Notice,
 ) -> Result<(), Verdict> {
     let built = subject.built.as_ref().map_err(Verdict::clone)?;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::clock::{Lap, Stopwatch};
 use super::count::{MOST_JUDGED, errors, spread};
-use super::process_result::Known;
+use super::process_result::ReferenceResults;
 use super::{
     Answer, Judged, Notice, Protocol, Schedule, Status, TaskKind, TimedTask, Verdict, Workload,
     compare_with_scan, guarded, timed,
@@ -16,7 +16,7 @@ use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec, UpdatePolicy};
 use crate::motion::{Motion, Replay};
 use crate::query::ItemId;
-use crate::scene::Originals;
+use crate::scene::WrittenBoxes;
 use crate::verify::{Truth, scan};
 
 /// Most timed cameras.
@@ -41,7 +41,7 @@ impl<'w> Frames<'w> {
     pub(super) fn new(
         workload: &'w Workload<'w>,
         motion: &'w Motion,
-        known: Option<&Known>,
+        known: Option<&ReferenceResults>,
         notice: Notice,
     ) -> Frames<'w> {
         let mut frames = Frames {
@@ -68,7 +68,7 @@ impl<'w> Frames<'w> {
             if let Some((n, _)) = due.next_if(|(_, due)| *due == frame) {
                 // The views of a frame in turn.
                 let camera = (frame * views + n % views) % workload.cameras.len();
-                let written = Originals::listed(&written);
+                let written = WrittenBoxes::listed(&written);
                 let seen = &workload.cameras[camera];
                 let truth = Truth::of_written(seen, scene.origin, &boxes, &written);
                 let errors = truth.map(|truth| errors(workload, camera, &truth, &boxes, &items));

@@ -28,7 +28,7 @@ pub struct Part {
     /// The path, in the form of reports.
     pub path: PathInfo,
     /// Answers and schedules for the other processes; from the first process only.
-    pub known: Option<Known>,
+    pub known: Option<ReferenceResults>,
     /// Errors of the answers against the exact truth; the first process only.
     pub judged: Option<Judged>,
     /// Structures in the order of the plan, twins last.
@@ -101,7 +101,7 @@ pub struct TaskPart {
 
 /// Right answers and schedules of the first process, which all others use.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Known {
+pub struct ReferenceResults {
     /// Right answer of the frustum query of every camera.
     ///
     /// Empty if the receiving process must count for itself.
@@ -131,7 +131,7 @@ impl Part {
     }
 }
 
-impl Known {
+impl ReferenceResults {
     /// Schedule of a pass, if it is timed, and the right answers.
     pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule>, &[Answer]) {
         match pass {

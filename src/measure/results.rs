@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::group::LEAST_TAIL;
 use super::index_under_test::{MOST_UPDATED, TWIN};
 use super::metrics::{METRICS, MetricInfo, Of};
-use super::process_result::{Known, Part, SubjectPart, TaskPart};
+use super::process_result::{Part, ReferenceResults, SubjectPart, TaskPart};
 use super::{CellTimes, Judged, Metric, ReportCell, Status, TaskKind, TwinEntry, Verdict};
 use crate::shown::hex;
 use crate::statistics::{
@@ -64,7 +64,7 @@ struct MergedParts<'p> {
     /// The first part that has loaded the scene, or else the first.
     loaded: &'p Part,
     /// Answers and schedules of the first process.
-    known: Option<&'p Known>,
+    known: Option<&'p ReferenceResults>,
     /// ln of the CPU ns per query in each process, by label and task.
     ln_ns: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
     /// Label that times are paired with: [`YARDSTICK`], or else the first with times.

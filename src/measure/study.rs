@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
+use super::{OverProcesses, ProcessTimes, Protocol, QueryFn, Schedule, TimedTask, timed};
 use crate::index::StructureSpec;
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -44,7 +44,7 @@ impl<K> StudyPlan<K> {
     pub fn timed<'a>(
         &self,
         protocol: &Protocol,
-        mut ask: impl FnMut(&K) -> Ask<'a>,
+        mut ask: impl FnMut(&K) -> QueryFn<'a>,
     ) -> ProcessTimes {
         let tasks = self.tasks.iter();
         let tasks = tasks.map(|(key, expected)| TimedTask::new(expected.clone(), ask(key)));

@@ -12,17 +12,17 @@ use crate::query::{ItemId, Located};
 use crate::threads::Workers;
 
 /// Answers the query of the camera with this index: appends ids to an empty output.
-pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
+pub type QueryFn<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 
 /// Answers the queries of several cameras at once; returns the total number of ids.
-pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
+pub type BatchFn<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 
 /// A participant of a timed pass: its queries and the right sizes of their answers.
 pub struct TimedTask<'a> {
     /// Answers one query.
-    pub ask: Ask<'a>,
+    pub ask: QueryFn<'a>,
     /// Answers all queries of a pass in one batch; used instead of `ask` if present.
-    pub ask_many: Option<AskMany<'a>>,
+    pub ask_many: Option<BatchFn<'a>>,
     /// True if threads share a query: the CPU time of all threads counts.
     pub all_threads: bool,
     /// Number of ids that each query must return.
@@ -54,7 +54,7 @@ impl<'a> TimedTask<'a> {
         answers: &[Answer],
         least_ns: Option<f64>,
     ) -> Self {
-        let ask: Ask = match task {
+        let ask: QueryFn = match task {
             TaskKind::Locate | TaskKind::LocateBatched => {
                 let index = built.regions();
                 Box::new(move |camera, out| {
@@ -106,7 +106,7 @@ fn seen_at_once<'a>(
     workload: &'a Workload,
     built: &'a Built,
     threads: usize,
-) -> Option<AskMany<'a>> {
+) -> Option<BatchFn<'a>> {
     let workers = Workers::new(threads).ok()?;
     let (index, lists) = (built.items.as_ref(), RefCell::new(Vec::new()));
     Some(Box::new(move |cameras| {
@@ -131,7 +131,7 @@ const SHARES: usize = 8;
 /// Region search at the eyes of several cameras in one call.
 ///
 /// The memory for points and answers is reused from call to call.
-fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> {
+fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> BatchFn<'a> {
     let index = built.regions();
     let kept = RefCell::new((Vec::new(), Located::default(), Vec::new()));
     Box::new(move |cameras| {

@@ -13,7 +13,7 @@ use crate::index::Input;
 use crate::motion::Motion;
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{Scene, Sought};
+use crate::scene::{Scene, SearchPoint};
 
 /// Input of a structure: `items` and the scene's own partition.
 ///
@@ -49,7 +49,7 @@ pub struct Workload<'a> {
     /// Eyes of the cameras in f32, for region search.
     pub points: Vec<Vec3>,
     /// The same eyes in f64 too, for the exact test of an index's candidates.
-    pub sought: Vec<Sought>,
+    pub sought: Vec<SearchPoint>,
     /// New bounds of the items, frame by frame; `None` for a still scene.
     pub motion: Option<Motion>,
     /// Number of queries per frame; the frames take the views in turn.
@@ -110,7 +110,7 @@ impl<'a> Workload<'a> {
         });
         let views = views.collect::<Result<_, _>>()?;
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
-        let sought: Vec<Sought> = eyes.map(|eye| scene.sought(eye)).collect();
+        let sought: Vec<SearchPoint> = eyes.map(|eye| scene.search_point(eye)).collect();
         Ok(Workload {
             scene,
             path: path.name.clone(),

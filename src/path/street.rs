@@ -72,7 +72,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
     for _ in 0..MORE {
         // All candidates of an eye may have been under trees.
         let high = stands.iter_mut().filter(|stand| stand.is_on_top);
-        let high: Vec<&mut Stand> = high.collect();
+        let high: Vec<&mut StandingPoint> = high.collect();
         let others = lowest(stage, height, high.len(), &mut rng);
         for (stand, other) in high.into_iter().zip(others) {
             if other.rise < stand.rise || !other.is_on_top {
@@ -87,7 +87,7 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
 
 /// A position that an eye may take.
 #[derive(Clone, Copy)]
-struct Stand {
+struct StandingPoint {
     eye: DVec3,
     /// Height above the foot of the lowest item there, or above the floor.
     rise: f64,
@@ -96,8 +96,8 @@ struct Stand {
 }
 
 /// For each of `count` eyes the lowest of its candidates.
-fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
-    let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
+fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<StandingPoint> {
+    let mut columns: Vec<Column> = (0..count).flat_map(|_| candidates(stage, rng)).collect();
     fill(stage, &mut columns, height + CLEARANCE);
     // If nearly all candidates have an item below them, the others are beyond the scene's edge.
     let bare = columns.iter().filter(|column| column.first.is_none());
@@ -107,7 +107,7 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
             let (ground, first) = (column.ground, column.first.as_ref());
             let is_off_mesh = !first.is_some_and(|span| span.is_ground);
             let is_beyond = has_ground && first.is_none();
-            let stand = Stand {
+            let stand = StandingPoint {
                 eye: DVec3::new(column.x, column.y, ground + height),
                 rise: ground - first.map_or(column.low, |span| span.bottom),
                 is_on_top: ground > first.map_or(column.low, |span| span.top),
@@ -126,7 +126,7 @@ fn level(rng: &mut SeededRng) -> DVec3 {
 }
 
 /// The candidates of one eye: in one room, if there are rooms.
-fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
+fn candidates(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
     let (min, max) = match &stage.scene.regions {
         Regions::Tiling(tiling) if !tiling.boxes.is_empty() => {
             stage.in_world(&tiling.boxes[rng.below(tiling.boxes.len())])
@@ -257,7 +257,7 @@ impl Column {
 mod tests {
     use glam::DVec3;
 
-    use super::{Column, MOST_SPANS, Span, Stage, drawn, fill, pierce};
+    use super::{Column, MOST_SPANS, Span, Stage, candidates, fill, pierce};
     use crate::path::{self, LensDefaults};
     use crate::scene::{self, Scene, SeededRng, WorldBox};
 
@@ -323,7 +323,9 @@ mod tests {
             seed: 1,
         };
         let mut rng = stage.rng();
-        let mut columns: Vec<Column> = (0..128).flat_map(|_| drawn(&stage, &mut rng)).collect();
+        let mut columns: Vec<Column> = (0..128)
+            .flat_map(|_| candidates(&stage, &mut rng))
+            .collect();
         // Together they would hold half as much again.
         assert!(!pierce(&stage, &mut columns));
         let held: usize = columns.iter().map(|column| column.spans.len()).sum();

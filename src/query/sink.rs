@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
-use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece, extend, extend_from_range};
+use crate::kernel::{Append, Isa, LANES, LaneMask, Piece, extend, extend_from_range};
 
 /// Destination of answers. `Break` ends the query.
 ///
@@ -138,7 +138,7 @@ impl Sink for Vec<ItemId> {
         tests: T,
     ) -> ControlFlow<()> {
         let out = self;
-        isa.apart(Gather { out, ids, tests });
+        isa.run_outlined(Gather { out, ids, tests });
         ControlFlow::Continue(())
     }
 }
@@ -157,11 +157,11 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
     fn run(self, isa: I) {
         let mut tests = self.tests;
         let count = tests.count();
-        let mut packer = I::Packer::onto(self.out, count * LANES);
+        let mut appender = I::Appender::onto(self.out, count * LANES);
         if !T::SPARSE || count <= FEW {
             for i in 0..count {
                 let (block, lanes) = tests.test(isa, i);
-                packer.push(isa, &self.ids[block], lanes);
+                appender.push(isa, &self.ids[block], lanes);
             }
             return;
         }
@@ -189,7 +189,7 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
             }
             for &i in &hits[..found] {
                 let (block, lanes) = (blocks[i as usize], held[i as usize]);
-                packer.push(isa, &self.ids[block], lanes as LaneMask);
+                appender.push(isa, &self.ids[block], lanes as LaneMask);
             }
         }
     }

@@ -8,9 +8,11 @@ use std::{fmt, slice};
 
 use serde::Serialize;
 
-use super::judging::{COUNTERS, Changes, CommonShift, JudgedRow, Lone, Outcome, WORK, WorkChange};
+use super::judging::{
+    COUNTERS, Changes, CommonShift, JudgedRow, Outcome, UnmatchedCell, WORK, WorkChange,
+};
 use super::ranking::{
-    Pair, answered_otherwise, asked_otherwise, grouped, matched, timed_otherwise,
+    Pair, answer_difference, grouped, matched, query_difference, work_difference,
 };
 use super::{Report, ReportCell};
 use crate::measure::{GroupKey, Machine, Status, Toolchain};
@@ -60,7 +62,7 @@ pub fn changes(
     };
     let (mut counted, mut timed) = (Vec::new(), Vec::new());
     for pair in pairs {
-        if asked_otherwise(pair).is_none() {
+        if query_difference(pair).is_none() {
             found.work_changed.extend(work_changes(pair));
         }
         if let Some(row) = as_a_whole(pair) {
@@ -68,7 +70,7 @@ pub fn changes(
             continue;
         }
         counted.push(pair);
-        let different = answered_otherwise(pair);
+        let different = answer_difference(pair);
         // Two programs may round planes differently.
         if basis == Basis::Pairs || different.is_none() {
             timed.push(pair);
@@ -105,8 +107,8 @@ fn work_changes((old, new): Pair) -> impl Iterator<Item = WorkChange> {
     })
 }
 
-fn lone(cell: &ReportCell) -> Lone {
-    Lone {
+fn lone(cell: &ReportCell) -> UnmatchedCell {
+    UnmatchedCell {
         cell: cell.key(),
         status: cell.status,
         reason: cell.reason.clone(),
@@ -131,7 +133,7 @@ fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
     let by_status = Outcome::of_statuses(old.status, new.status);
     // Wrong is wrong, whatever the question was.
     if by_status != Some(Outcome::Broken)
-        && let Some(reason) = asked_otherwise(pair)
+        && let Some(reason) = query_difference(pair)
     {
         return Some(row(pair, Outcome::Different, Some(reason)));
     }
@@ -214,7 +216,7 @@ fn by_metric(basis: Basis, pairs: &[Pair], metric: &'static str, threshold: f64)
             Some(logs) => row.processes = logs.each_ref().map(Vec::len),
         }
         // A build does not depend on cameras.
-        let differs = timed_otherwise(pair).filter(|_| own.is_some() && metric != "build_ms");
+        let differs = work_difference(pair).filter(|_| own.is_some() && metric != "build_ms");
         if let Some(reason) = differs {
             (row.outcome, row.reason, own) = (Outcome::Different, Some(reason), None);
         }
@@ -348,7 +350,7 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
 /// Then the groups that moved relative to it. Empty without a cell that both have timed.
 fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<CommonShift> {
     let timed = pairs.iter().filter_map(|&pair| {
-        let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
+        let is_ok = pair.0.status == Status::Ok && work_difference(pair).is_none();
         let logs = logs(pair, metric).filter(|_| is_ok)?;
         Some((pair.1.key().group, centred(&logs)))
     });

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use super::Report;
-use super::stream::{Header, KeptPart, Stream, digits, utc};
+use super::stream::{Header, StoredPart, Stream, digits, utc};
 use crate::index::StructureSpec;
 use crate::measure::{
     Effort, ExperimentError, Extras, Machine, Part, PathOf, Plan, PlannedScene, Share,
@@ -124,9 +124,9 @@ impl Experiment {
         for planned in &self.plan.scenes {
             let share = Share::first(self.plan.groups_of(planned).len());
             let mut keep = |part: Part, _| {
-                stream.parts.push(KeptPart {
+                stream.parts.push(StoredPart {
                     part,
-                    ..KeptPart::default()
+                    ..StoredPart::default()
                 });
             };
             let held = self.held.as_ref();

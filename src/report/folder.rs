@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use super::reading::read_stream;
-use super::stream::{Header, KeptPart, Line, Stream};
+use super::stream::{Header, Line, StoredPart, Stream};
 use super::writing::{self, PAGE, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
@@ -95,7 +95,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// I/O errors.
-    pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, InputError> {
+    pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<StoredPart, InputError> {
         let (key, path) = (&part.key, part.key.samples_path());
         let mut rows = BTreeMap::new();
         let mut write = || -> Result<Vec<u8>, csv::Error> {
@@ -117,7 +117,7 @@ impl RunFolder {
         let text = write().map_err(|error| io(error.into()))?;
         self.samples.write_all(&text).map_err(io)?;
         let samples_end = self.samples.metadata().map_err(io)?.len();
-        let kept = KeptPart {
+        let kept = StoredPart {
             part,
             rows,
             samples_end,

@@ -23,14 +23,16 @@ pub use experiment::Experiment;
 pub(crate) use folder::save_page;
 pub use folder::{RunFolder, StoppedRun, save_report};
 pub(crate) use judging::WORK;
-pub use judging::{Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange};
+pub use judging::{
+    Changes, CommonShift, JUDGED_METRICS, JudgedRow, Outcome, UnmatchedCell, WorkChange,
+};
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION};
 pub use ranking::{Comparison, comparisons};
 pub(crate) use ranking::{Mean, Overall, times_as_fast};
-pub(crate) use ranking::{answered_otherwise, asked_otherwise, grouped, timed_otherwise, unique};
+pub(crate) use ranking::{answer_difference, grouped, query_difference, unique, work_difference};
 pub use reading::{Reading, Views, read_report, read_stream, views};
-pub use stream::{Header, KeptPart, Line, Stream};
+pub use stream::{Header, Line, StoredPart, Stream};
 pub(crate) use stream::{digits, utc};
 pub use surface::{Crossing, Growth, Place, Surface, growths, surfaces};
 pub(crate) use writing::{folder_of, temporary_in, try_folder, try_place, write_atomically};

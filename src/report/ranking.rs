@@ -183,7 +183,7 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
 /// The reason why two cells are not the same query; `None` if they are.
 ///
 /// A process that ended before its scene was loaded has no numbers of items and cameras.
-pub fn asked_otherwise((old, new): Pair) -> Option<String> {
+pub fn query_difference((old, new): Pair) -> Option<String> {
     if old.scene.digest.is_empty() || new.scene.digest.is_empty() {
         return None;
     }
@@ -200,7 +200,7 @@ pub fn asked_otherwise((old, new): Pair) -> Option<String> {
 }
 
 /// The reason why two right answers are not the same sets; `None` if they are.
-pub fn answered_otherwise((old, new): Pair) -> Option<String> {
+pub fn answer_difference((old, new): Pair) -> Option<String> {
     let counts = old.value("visible_count").zip(new.value("visible_count"));
     if let Some((was, is)) = counts.filter(|(was, is)| was != is) {
         return Some(format!("visible_count {} and {}", number(was), number(is)));
@@ -212,7 +212,7 @@ pub fn answered_otherwise((old, new): Pair) -> Option<String> {
 /// The reason why two times are not of the same work; `None` if they are.
 ///
 /// The mean over other cameras, or of shorter batches, is another figure.
-pub fn timed_otherwise((old, new): Pair) -> Option<String> {
+pub fn work_difference((old, new): Pair) -> Option<String> {
     let (was, is) = (&old.times, &new.times);
     if was.cameras_timed != is.cameras_timed {
         let (was, is) = (was.cameras_timed, is.cameras_timed);

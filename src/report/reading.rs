@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::ranking::without_false_ranks;
-use super::stream::{Header, KeptPart, Stream};
+use super::stream::{Header, StoredPart, Stream};
 use super::writing::{self, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM};
 use super::{Report, ReportCell, SCHEMA_VERSION};
 use crate::input::InputError;
@@ -110,7 +110,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, Vec<u64>), InputError> {
             }
             ("run", Some(_)) => return bad("a second header", "one, in the first line"),
             ("part", Some(stream)) => {
-                let kept: KeptPart = from_json(text).map_err(no_json)?;
+                let kept: StoredPart = from_json(text).map_err(no_json)?;
                 let Part { key, process, .. } = &kept.part;
                 let (scene, way, test) = (&key.scene, &key.path, &key.test);
                 let number = u64::from(*process) + 1;

@@ -25,7 +25,7 @@ pub enum Line<'l> {
     /// The first line: everything about the run except its cells.
     Run(&'l Header),
     /// Results of one process for one group of cells.
-    Part(&'l KeptPart),
+    Part(&'l StoredPart),
     /// All parts of the plan are present.
     Finished {
         /// RFC 3339, UTC.
@@ -153,7 +153,7 @@ impl Header {
 
 /// A part with the length of samples.csv after it.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
-pub struct KeptPart {
+pub struct StoredPart {
     /// Results of the process.
     pub part: Part,
     /// Rows of each structure or bound.
@@ -168,7 +168,7 @@ pub struct Stream {
     /// The first line.
     pub header: Header,
     /// Parts in the order of measurement.
-    pub parts: Vec<KeptPart>,
+    pub parts: Vec<StoredPart>,
     /// RFC 3339, UTC; `None` for a run that is running or was stopped.
     pub finished_at: Option<String>,
 }
@@ -204,9 +204,9 @@ impl Stream {
     }
 
     /// The parts of a group, the first process first.
-    pub fn of_group(&self, key: &GroupKey) -> Vec<&KeptPart> {
+    pub fn of_group(&self, key: &GroupKey) -> Vec<&StoredPart> {
         let parts = self.parts.iter().filter(|kept| kept.part.key == *key);
-        let mut parts: Vec<&KeptPart> = parts.collect();
+        let mut parts: Vec<&StoredPart> = parts.collect();
         parts.sort_by_key(|kept| kept.part.process);
         parts
     }
@@ -236,7 +236,7 @@ impl Stream {
             let mut group = Group::of(&parts);
             report.noise.twins.extend(group.twin);
             for cell in group.cells.iter_mut().chain(&mut group.bounds) {
-                let rows = |kept: &&KeptPart| kept.rows.get(&cell.structure).copied();
+                let rows = |kept: &&StoredPart| kept.rows.get(&cell.structure).copied();
                 let rows = kept.iter().filter_map(rows).fold(0, u64::saturating_add);
                 let file = super::writing::SAMPLES.to_owned();
                 cell.samples_ref = (rows > 0).then_some(SamplesRef { file, rows });

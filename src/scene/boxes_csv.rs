@@ -50,7 +50,7 @@ pub fn read_boxes_csv(bytes: &[u8], file: &str, skip_bad_items: bool) -> Result<
 ///
 /// # Errors
 /// A missing or wrong header, or the first bad row.
-pub fn read_sought_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
+pub fn read_search_boxes_csv(bytes: &[u8], file: &str) -> Result<Vec<WorldBox>> {
     let mut table = TableReader::open(bytes, file, &BOUNDS)?;
     let mut rows = read_rows(&mut table, f64::MAX)?;
     rows.first_bad.take().map_or(Ok(()), Err)?;

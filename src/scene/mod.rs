@@ -42,7 +42,7 @@ use crate::query::ItemId;
 
 pub use crate::input::InputError;
 pub(crate) use crate::shown::hex;
-pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+pub use boxes_csv::{read_boxes_csv, read_search_boxes_csv, write_boxes_csv};
 pub use bsp::BspChild;
 pub(crate) use bsp::clipped;
 pub use disputes::{Dispute, Linedef};
@@ -66,7 +66,7 @@ pub use source::{load, part_names, read_bytes};
 pub(crate) use surface::volume_within;
 pub use surface::{ItemShape, SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_names};
-pub use written::{Originals, Sought, SoughtBox};
+pub use written::{SearchBox, SearchPoint, WrittenBoxes};
 #[cfg(test)]
 pub(crate) use zip::tests::packed;
 
@@ -222,7 +222,7 @@ pub struct Scene {
     /// Item bounds, rounded outward relative to the origin; the id is the index.
     pub items: Vec<Aabb>,
     /// The items as written, if f32 changes any of them.
-    pub originals: Originals,
+    pub originals: WrittenBoxes,
     /// Union of the items, local.
     pub bounds: Aabb,
     /// The triangles of the items, if the scene is a mesh.
@@ -290,7 +290,7 @@ impl Scene {
         }
         Ok(Scene {
             bounds: Aabb::union_of(&items),
-            originals: Originals::of(boxes, &items, origin),
+            originals: WrittenBoxes::of(boxes, &items, origin),
             name,
             origin,
             items,

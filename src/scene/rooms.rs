@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::rng::SeededRng;
-use super::{Originals, WorldBox};
+use super::{WorldBox, WrittenBoxes};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
@@ -17,7 +17,7 @@ pub struct Tiling {
     /// Boxes in scene coordinates; the id is the index.
     pub boxes: Vec<Aabb>,
     /// The boxes as written, if f32 changes any of them.
-    pub originals: Originals,
+    pub originals: WrittenBoxes,
     /// Openings between neighbours.
     pub portals: Vec<Portal>,
 }
@@ -59,7 +59,7 @@ impl World {
             opening: local(opening),
         };
         Tiling {
-            originals: Originals::of(&self.rooms, &boxes, origin),
+            originals: WrittenBoxes::of(&self.rooms, &boxes, origin),
             boxes,
             portals: self.doors.iter().map(portal).collect(),
         }

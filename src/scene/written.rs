@@ -16,22 +16,22 @@ use crate::query::ItemId;
 ///
 /// A NaN box stands for the stored one, as for an item that a generated motion moves.
 #[derive(Clone, Default, Debug)]
-pub struct Originals {
+pub struct WrittenBoxes {
     boxes: Arc<[WorldBox]>,
 }
 
-impl Originals {
+impl WrittenBoxes {
     /// Keeps `written` if `stored`, the same boxes about `origin`, differs.
-    pub(super) fn of(written: &[WorldBox], stored: &[Aabb], origin: DVec3) -> Originals {
+    pub(super) fn of(written: &[WorldBox], stored: &[Aabb], origin: DVec3) -> WrittenBoxes {
         let mut both = written.iter().zip(stored);
         let exact = both.all(|(written, stored)| written.is_stored_as(stored, origin));
-        Originals::listed(if exact { &[] } else { written })
+        WrittenBoxes::listed(if exact { &[] } else { written })
     }
 
     /// The boxes by id; none if all equal the stored ones.
-    pub(crate) fn listed(boxes: &[WorldBox]) -> Originals {
+    pub(crate) fn listed(boxes: &[WorldBox]) -> WrittenBoxes {
         let all_stored = boxes.iter().all(|b| b.min.is_nan());
-        Originals {
+        WrittenBoxes {
             boxes: if all_stored { &[] } else { boxes }.into(),
         }
     }
@@ -58,7 +58,7 @@ impl Originals {
 /// Rounding to nearest loses no box: a bound is an f32 number, and a coordinate beyond it is
 /// rounded beyond it or onto it. It can only add candidates.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Sought {
+pub struct SearchPoint {
     /// World coordinates, in f64.
     pub world: DVec3,
     /// Scene coordinates, rounded to the nearest f32.
@@ -67,7 +67,7 @@ pub struct Sought {
 
 /// A box to search by: as written, and rounded for indexes.
 #[derive(Clone, Debug)]
-pub struct SoughtBox {
+pub struct SearchBox {
     /// World coordinates, in f64.
     pub world: WorldBox,
     /// The planes of the smallest f32 box that contains it.
@@ -81,19 +81,19 @@ impl Scene {
     ///
     /// A planar BSP ignores the height.
     #[inline]
-    pub fn sought(&self, world: DVec3) -> Sought {
+    pub fn search_point(&self, world: DVec3) -> SearchPoint {
         let mut local = (world - self.origin).as_vec3();
         if let Regions::Bsp(_) = self.regions {
             local.z = 0.0;
         }
-        Sought { world, local }
+        SearchPoint { world, local }
     }
 
     /// A world box in the form that this scene's indexes take.
-    pub fn sought_box(&self, world: WorldBox) -> SoughtBox {
+    pub fn search_box(&self, world: WorldBox) -> SearchBox {
         let local = Aabb::rounded_outward(world.min, world.max, self.origin);
         let volume = ConvexVolume::of_box(&local);
-        SoughtBox { world, volume }
+        SearchBox { world, volume }
     }
 
     /// Region search: the regions that contain the point exactly.
@@ -102,7 +102,7 @@ impl Scene {
     #[inline]
     pub fn search(
         &self,
-        p: &Sought,
+        p: &SearchPoint,
         out: &mut Vec<ItemId>,
         ask: impl FnOnce(Vec3, &mut Vec<ItemId>),
     ) {
@@ -112,10 +112,10 @@ impl Scene {
     }
 
     /// Tests whether candidates for a point need [`Scene::refine`].
-    pub fn is_refined(&self, p: &Sought) -> bool {
+    pub fn is_refined(&self, p: &SearchPoint) -> bool {
         let is_rounded = |k: usize| side(p.world[k], self.origin[k], p.local[k]) != 0;
         matches!(self.regions, Regions::Bsp(_) | Regions::Leaves(_))
-            || self.region_originals().boxes().is_some()
+            || self.written_regions().boxes().is_some()
             || (0..3).any(is_rounded)
     }
 
@@ -123,13 +123,13 @@ impl Scene {
     ///
     /// Drops other candidates from index `first` on.
     #[inline]
-    pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
+    pub fn refine(&self, p: &SearchPoint, found: &mut Vec<ItemId>, first: usize) {
         if found.len() > first && self.is_refined(p) {
             self.keep_holding(p, found, first);
         }
     }
 
-    fn keep_holding(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
+    fn keep_holding(&self, p: &SearchPoint, found: &mut Vec<ItemId>, first: usize) {
         match self.regions.leaf_at(p.world - self.origin) {
             Some(leaf) => retain_from(first, found, |region| Some(region) == leaf),
             None => retain_from(first, found, |id| self.holds(id, p.world)),
@@ -139,14 +139,14 @@ impl Scene {
     /// Keeps the candidates of an index that overlap the box exactly.
     ///
     /// Closed boxes with a common point.
-    pub fn refine_overlapping(&self, sought: &SoughtBox, found: &mut Vec<ItemId>) {
+    pub fn refine_overlapping(&self, sought: &SearchBox, found: &mut Vec<ItemId>) {
         found.retain(|&id| self.overlaps(id, &sought.world));
     }
 
     /// Reference answer of region search, ascending ids.
     ///
     /// Computed by the map's own descent, or an exact test of every box.
-    pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
+    pub fn holding(&self, p: &SearchPoint) -> Vec<ItemId> {
         if let Some(leaf) = self.regions.leaf_at(p.world - self.origin) {
             return leaf.into_iter().collect();
         }
@@ -157,7 +157,7 @@ impl Scene {
     /// Tests whether a region that is a box contains a world point.
     fn holds(&self, id: ItemId, p: DVec3) -> bool {
         let boxes = self.regions.boxes(&self.items);
-        self.meets(boxes, self.region_originals(), id, &WorldBox::at(p))
+        self.meets(boxes, self.written_regions(), id, &WorldBox::at(p))
     }
 
     /// Tests whether an item, as written, has a point in common with a box.
@@ -166,7 +166,7 @@ impl Scene {
     }
 
     /// Tests whether a listed box, as written, has a point in common with another.
-    fn meets(&self, boxes: &[Aabb], originals: &Originals, id: ItemId, by: &WorldBox) -> bool {
+    fn meets(&self, boxes: &[Aabb], originals: &WrittenBoxes, id: ItemId, by: &WorldBox) -> bool {
         if let Some(written) = originals.boxes() {
             return written[id as usize].meets(by);
         }
@@ -178,7 +178,7 @@ impl Scene {
     }
 
     /// The regions as written.
-    pub(crate) fn region_originals(&self) -> &Originals {
+    pub(crate) fn written_regions(&self) -> &WrittenBoxes {
         match &self.regions {
             Regions::Tiling(tiling) => &tiling.originals,
             _ => &self.originals,
@@ -258,9 +258,9 @@ mod tests {
         let boxes = [WorldBox::new(DVec3::ZERO, DVec3::ONE)];
         let scene = Scene::about("exact", &boxes, DVec3::ZERO).expect("a scene");
         assert!(scene.originals.boxes().is_none());
-        let p = scene.sought(DVec3::splat(0.5));
+        let p = scene.search_point(DVec3::splat(0.5));
         assert!(!scene.is_refined(&p));
-        let p = scene.sought(DVec3::new(1.0 + 1e-12, 0.5, 0.5));
+        let p = scene.search_point(DVec3::new(1.0 + 1e-12, 0.5, 0.5));
         let mut found = vec![0];
         assert!(scene.is_refined(&p) && p.local.x == 1.0);
         scene.refine(&p, &mut found, 0);
@@ -273,7 +273,7 @@ mod tests {
         let scene = Scene::from_boxes("one", &[unit]).expect("a box");
         let found = |min: f64, max: f64| {
             let by = WorldBox::new(DVec3::splat(min), DVec3::splat(max));
-            let sought = scene.sought_box(by);
+            let sought = scene.search_box(by);
             let mut found = vec![0];
             scene.refine_overlapping(&sought, &mut found);
             let found = found.len();

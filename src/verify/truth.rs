@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::geometry::Aabb;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::ItemId;
-use crate::scene::{Originals, Scene, WorldBox};
+use crate::scene::{Scene, WorldBox, WrittenBoxes};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub struct Truth {
     /// Oracle about the boxes as written, in world coordinates.
     ///
     /// `None` if the stored boxes are the same.
-    written: Option<(Oracle, Originals)>,
+    written: Option<(Oracle, WrittenBoxes)>,
     /// Verdicts by item id.
     pub verdicts: Vec<Verdict>,
     /// Counts of the visible items, without errors.
@@ -116,7 +116,7 @@ impl Truth {
     ///
     /// O(items), some 50 ns each. `None` if the pose has no frame.
     pub fn of_camera(camera: &Camera, origin: DVec3, items: &[Aabb]) -> Option<Truth> {
-        Truth::of_written(camera, origin, items, &Originals::default())
+        Truth::of_written(camera, origin, items, &WrittenBoxes::default())
     }
 
     /// Truth at camera level about the boxes of a scene as written.
@@ -131,7 +131,7 @@ impl Truth {
         camera: &Camera,
         origin: DVec3,
         items: &[Aabb],
-        originals: &Originals,
+        originals: &WrittenBoxes,
     ) -> Option<Truth> {
         let of = |origin| Oracle::of_camera(&Pose::of(camera), &camera.lens, origin);
         let stored = of(origin)?;
@@ -142,7 +142,7 @@ impl Truth {
         Some(Truth::new(stored, written, items))
     }
 
-    fn new(oracle: Oracle, written: Option<(Oracle, Originals)>, items: &[Aabb]) -> Truth {
+    fn new(oracle: Oracle, written: Option<(Oracle, WrittenBoxes)>, items: &[Aabb]) -> Truth {
         let mut truth = Truth {
             oracle,
             written,

@@ -10,7 +10,7 @@ use cullbench::index::{
     BlockOrder, Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Wide,
     WideParams,
 };
-use cullbench::kernel::{Isa, LANES, LaneMask, Pack, Plain};
+use cullbench::kernel::{Append, Isa, LANES, LaneMask, Plain};
 use cullbench::query::{ItemId, Located, Predicate, QueryVolume};
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
@@ -162,9 +162,9 @@ fn scenes_at_the_edge_are_right() {
 }
 
 fn packed<I: Isa>(isa: I, out: &mut Vec<u32>, words: usize, rows: &[([u32; LANES], LaneMask)]) {
-    let mut packer = I::Packer::onto(out, words);
+    let mut appender = I::Appender::onto(out, words);
     for (row, lanes) in rows {
-        packer.push(isa, row, *lanes);
+        appender.push(isa, row, *lanes);
     }
 }
 

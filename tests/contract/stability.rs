@@ -129,7 +129,7 @@ impl Digest {
                 self.f64s(&p.normal.as_dvec3().to_array());
                 self.f64s(&[p.d.into()]);
             }),
-            CameraView::Wide(volume) => volume.planes().iter().for_each(|p| {
+            CameraView::PlanesF64(volume) => volume.planes().iter().for_each(|p| {
                 self.f64s(&p.normal.to_array());
                 self.f64s(&[p.d]);
             }),

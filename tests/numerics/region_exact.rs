@@ -42,7 +42,7 @@ fn every_structure_finds_what_f64_says_where_f32_cannot_tell() {
                     continue;
                 };
                 for &p in &points {
-                    let sought = scene.sought(p);
+                    let sought = scene.search_point(p);
                     let inside = |b: &WorldBox| {
                         (0..3).all(|k| {
                             let p = units(p[k]);
@@ -92,7 +92,7 @@ fn every_structure_finds_what_overlaps_a_box_as_written() {
         let indexes: Vec<_> = indexes.filter_map(Result::ok).collect();
         assert!(indexes.len() > 5);
         for _ in 0..100 {
-            let sought = scene.sought_box(any());
+            let sought = scene.search_box(any());
             let by = &sought.world;
             let overlaps = |b: &WorldBox| {
                 (0..3).all(|k| {

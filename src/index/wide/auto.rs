@@ -27,7 +27,7 @@ const UPDATES: [&str; 4] = ["scan of overwritten boxes", "refit", "rebuild", "tw
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
-const PART: usize = 3;
+const TWO_TREES: usize = 3;
 
 // Times in ns, measured on one processor (AVX-512). Choices depend only on their ratios.
 /// A query without its tests, by search.
@@ -43,7 +43,7 @@ const MOVE_NS: [f64; 2] = [4.0, 8.0];
 /// A refit, and each leaf whose bounds it recomputes.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
 /// A refit of the two trees, per moved item that jumps.
-const PART_NS: f64 = 250.0;
+const TWO_TREES_NS: f64 = 250.0;
 /// Time of a query of two trees / of one in a new tree, until it is counted.
 const TWO: f64 = 2.0;
 /// An item of a build.
@@ -66,7 +66,7 @@ const TOGETHER: u32 = 8;
 /// Items x updates per weighing, if there are few items.
 const FEW: u32 = 2048;
 /// Most queries counted between two weighings; later ones write nothing.
-const MOST_ASKED: u32 = 256;
+const MOST_QUERIES: u32 = 256;
 
 /// A tree, or a scan, by counted work.
 #[derive(Default)]
@@ -77,7 +77,7 @@ pub struct Auto {
     /// A scan of the same boxes, kept until the number of queries per frame is known.
     reserve: Option<Linear>,
     /// True if movers have a separate tree.
-    is_parted: bool,
+    two_trees: bool,
     params: AutoParams,
     /// Index of the search after a build.
     built: usize,
@@ -88,8 +88,8 @@ pub struct Auto {
     fresh: [Option<f64>; VIEWS],
     /// The view that was counted last.
     turn: usize,
-    /// Queries since the last weighing, at most [`MOST_ASKED`].
-    asked: AtomicU32,
+    /// Queries since the last weighing, at most [`MOST_QUERIES`].
+    queries: AtomicU32,
     /// Updates since the last weighing, and items moved.
     weighing: u32,
     moved: f64,
@@ -159,7 +159,7 @@ impl Auto {
         let [now, fresh] = both.fold([0.0; 2], |sum, both| [sum[0] + both[0], sum[1] + both[1]]);
         match fresh > 0.0 {
             true => self.costs[TREE] * now / fresh,
-            false => self.aged[usize::from(self.is_parted)],
+            false => self.aged[usize::from(self.two_trees)],
         }
     }
 
@@ -194,7 +194,7 @@ impl Auto {
 
     /// The scan that replaces a new tree, if the build chose a scan.
     fn built_scan(&self, items: &[Aabb]) -> Option<Linear> {
-        (self.built == SCAN && !self.is_parted).then(|| self.scan_of(items))?
+        (self.built == SCAN && !self.two_trees).then(|| self.scan_of(items))?
     }
 
     /// A scan that the second update may take.
@@ -213,17 +213,17 @@ impl Auto {
         let (order, spheres) = (self.params.order, self.trees.still.balls.is_some());
         let input = Input::new(items).spheres(spheres);
         // Two trees hold new items without reserved lanes.
-        let input = input.come_and_go(self.update != PART);
+        let input = input.come_and_go(self.update != TWO_TREES);
         let Ok(trees) = Moving::resting(&input, &WideParams { order }) else {
             return false;
         };
         self.trees = trees;
-        self.is_parted = self.update == PART;
+        self.two_trees = self.update == TWO_TREES;
         self.scan = self.built_scan(items);
-        if matches!(self.update, REFIT | PART) {
+        if matches!(self.update, REFIT | TWO_TREES) {
             let new = self.count(items);
             self.costs[TREE] = new;
-            self.aged[usize::from(self.is_parted)] = if self.is_parted { TWO * new } else { new };
+            self.aged[usize::from(self.two_trees)] = if self.two_trees { TWO * new } else { new };
         }
         self.start();
         self.updates[REBUILD] += 1;
@@ -255,7 +255,7 @@ impl Auto {
 
     /// Writes new bounds into the trees; false if they cannot take them over.
     fn refit_held(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        match self.is_parted {
+        match self.two_trees {
             true => self.trees.refit(items, moved),
             false => self.trees.still.take_over(items, moved),
         }
@@ -279,7 +279,7 @@ impl Auto {
         }
         if !is_held || self.is_old(items) {
             let is_built = self.rebuild(items);
-            if self.is_parted && !is_held {
+            if self.two_trees && !is_held {
                 // Too crowded, now and after a build.
                 self.aged[1] = f64::INFINITY;
             }
@@ -299,7 +299,7 @@ impl Auto {
     /// It pays if it would have saved [`AGE`] times the time of its build in the queries so far.
     /// Ageing up to the first count is left out: a new tree would age as fast.
     fn is_old(&mut self, items: &[Aabb]) -> bool {
-        let ([asked, spent], present) = (self.since, self.aged[usize::from(self.is_parted)]);
+        let ([queries, spent], present) = (self.since, self.aged[usize::from(self.two_trees)]);
         if self.params.update != Update::Auto || spent < RARELY * self.patience * COUNTED * present
         {
             return false;
@@ -310,8 +310,8 @@ impl Auto {
         let is_less = self.answered > 0.0 && aged < 2.0 * present;
         let more = (aged - present) / if is_less { 2.0 } else { 1.0 };
         self.saving += more * self.answered;
-        self.answered += asked;
-        self.aged[usize::from(self.is_parted)] += more;
+        self.answered += queries;
+        self.aged[usize::from(self.two_trees)] += more;
         self.patience = match more.abs() < 0.05 * aged {
             true => MOST_PATIENCE.min(4.0 * self.patience),
             false => 1.0,
@@ -327,24 +327,28 @@ impl Auto {
         let before = self.updates.iter().sum::<u32>();
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
-        let asked = f64::from(std::mem::take(self.asked.get_mut()));
+        let queries = f64::from(std::mem::take(self.queries.get_mut()));
         // Queries before the first update belong to no frame.
-        let asked = if before == 0 { 1.0 } else { asked.max(updates) };
+        let queries = if before == 0 {
+            1.0
+        } else {
+            queries.max(updates)
+        };
         let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
         // Approximate number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
         let fit = REFIT_NS[1] * fitted;
         self.costs[SCAN] = self.scan_ns();
         let scans = self.scan.is_some();
-        if scans || self.is_parted {
+        if scans || self.two_trees {
             self.aged[0] += (self.costs[TREE] - self.aged[0]) / FORGETS;
         }
         let [overwritten, taken] = MOVE_NS.map(|ns| ns * moved);
         let costs = [
-            overwritten + asked * self.costs[SCAN],
-            taken + REFIT_NS[0] * updates + fit + asked * self.aged[0],
-            BUILD_NS * all * updates + asked * self.costs[self.built],
-            taken + REFIT_NS[0] * updates + PART_NS * moved + asked * self.aged[1],
+            overwritten + queries * self.costs[SCAN],
+            taken + REFIT_NS[0] * updates + fit + queries * self.aged[0],
+            BUILD_NS * all * updates + queries * self.costs[self.built],
+            taken + REFIT_NS[0] * updates + TWO_TREES_NS * moved + queries * self.aged[1],
         ];
         for (spent, cost) in self.spent.iter_mut().zip(costs) {
             *spent += cost;
@@ -352,13 +356,14 @@ impl Auto {
         let best = match (self.params.update, self.params.structure) {
             (Update::Rebuild, _) => REBUILD,
             (_, Use::Linear) => OVERWRITE,
-            (_, Use::Moving) => PART,
+            (_, Use::Moving) => TWO_TREES,
             (Update::Refit, _) => REFIT.min(self.built),
             (_, Use::Wide) => REFIT,
             _ if before == 0 => REFIT.min(self.built),
             _ => (0..4).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
         };
-        let is_new = (best == PART) != self.is_parted || scans && best == REFIT && self.is_aged();
+        let is_new =
+            (best == TWO_TREES) != self.two_trees || scans && best == REFIT && self.is_aged();
         // A build; a switch between scan and tree; or a switch that keeps the tree.
         let change = match (is_new, best == OVERWRITE || scans) {
             (true, _) => BUILD_NS * all,
@@ -370,7 +375,7 @@ impl Auto {
         if before < 2 || self.regret > change {
             (self.update, self.regret) = (best, 0.0);
         }
-        self.since = [self.since[0] + asked, self.since[1] + costs[self.update]];
+        self.since = [self.since[0] + queries, self.since[1] + costs[self.update]];
     }
 }
 
@@ -388,8 +393,8 @@ impl RegionIndex for Auto {
 
     /// O(n log n), that of [`Wide`](super::Wide), and a few queries.
     fn build(input: &Input<'_>, params: &AutoParams) -> Result<Self, BuildError> {
-        let (order, is_parted) = (params.order, params.structure == Use::Moving);
-        if is_parted && params.update == Update::Rebuild {
+        let (order, two_trees) = (params.order, params.structure == Use::Moving);
+        if two_trees && params.update == Update::Rebuild {
             return Err(BuildError::Params {
                 structure: Self::INFO.name,
                 reason: "use=moving,update=rebuild; expected update=refit, as a new tree has no \
@@ -397,11 +402,11 @@ impl RegionIndex for Auto {
                     .to_owned(),
             });
         }
-        let input = input.come_and_go(input.come_and_go && !is_parted);
+        let input = input.come_and_go(input.come_and_go && !two_trees);
         let mut auto = Auto {
             trees: Moving::resting(&input, &WideParams { order })?,
             params: *params,
-            is_parted,
+            two_trees,
             ..Auto::default()
         };
         auto.calibrate(input.items);
@@ -423,9 +428,9 @@ impl RegionIndex for Auto {
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         // A query that counts its work is not one of a frame.
         if size_of::<C::Recorder>() == 0 {
-            let asked = self.asked.load(Relaxed);
-            if asked < MOST_ASKED {
-                self.asked.store(asked + 1, Relaxed);
+            let queries = self.queries.load(Relaxed);
+            if queries < MOST_QUERIES {
+                self.queries.store(queries + 1, Relaxed);
             }
         }
         let Some(scan) = &self.scan else {
@@ -467,7 +472,7 @@ impl RegionIndex for Auto {
         }
         match self.update {
             REBUILD => self.rebuild(items),
-            kind if (kind == PART) != self.is_parted => self.rebuild(items),
+            kind if (kind == TWO_TREES) != self.two_trees => self.rebuild(items),
             OVERWRITE => self.overwrite(items, moved),
             _ => self.refit_trees(items, moved),
         }

@@ -27,10 +27,10 @@ const MOST_ITEMS: usize = 1 << 28;
 const MOVER: usize = 1 << 31;
 
 /// Updates without a move after which an item rests.
-const REST: u8 = 8;
+const SETTLED: u8 = 8;
 
 /// Updates over which the movers of a leaf leave it, so that no update is slow.
-const LEAVING: u8 = 32;
+const LEAVE_EVERY: u8 = 32;
 
 /// Most growth of a leaf of the still tree per side, in longest edges of its home.
 const GROWTH: f32 = 0.25;
@@ -48,7 +48,7 @@ const CROWDED: usize = 32;
 const COARSE: usize = 256;
 
 /// Number of the first update, so that all items count as resting before it.
-const FIRST: u8 = 2 * REST;
+const FIRST: u8 = 2 * SETTLED;
 
 /// A tree of resting items and a tree of moving ones; items may come and go.
 #[derive(Default)]
@@ -128,7 +128,7 @@ impl Moving {
     /// Prepares homes and regions, once, and positions for `items` items.
     fn prepare(&mut self, items: usize) {
         self.positions.prepare(self.still.ids.iter(), items);
-        self.moved.resize(items.max(self.moved.len()), REST);
+        self.moved.resize(items.max(self.moved.len()), SETTLED);
         if self.regions.is_empty() {
             let leaves = self.still.occupied.len();
             self.homes = self.still.blocks[leaves..].to_vec();
@@ -221,7 +221,7 @@ impl Moving {
     /// Takes over the new bounds of an item.
     fn update(&mut self, id: ItemId, bounds: &Aabb) {
         let moved = std::mem::replace(&mut self.moved[id as usize], self.now);
-        let rested = self.now.wrapping_sub(moved) >= REST;
+        let rested = self.now.wrapping_sub(moved) >= SETTLED;
         let mut near = None;
         match self.positions.of(id) {
             Some(at) if at & MOVER != 0 => {
@@ -239,7 +239,8 @@ impl Moving {
             }
             Some(at) => {
                 let leaf = at / LANES;
-                let leaves = !rested && (id as u8).wrapping_add(self.now).is_multiple_of(LEAVING);
+                let turn = (id as u8).wrapping_add(self.now);
+                let leaves = !rested && turn.is_multiple_of(LEAVE_EVERY);
                 if !leaves && !bounds.is_empty() && self.fits(leaf, bounds) {
                     self.still.set(at, bounds);
                     self.still.grow(leaf, bounds);
@@ -383,13 +384,13 @@ impl Moving {
     }
 
     /// Returns resting movers of a few leaves to the still tree.
-    fn settle(&mut self, moved: usize) {
+    fn settle_movers(&mut self, moved: usize) {
         for _ in 0..(moved / 256 + 1).min(self.leaves.len()) {
             let leaf = self.next;
             self.next = (leaf + 1) % self.leaves.len();
             for at in (leaf * LANES..(leaf + 1) * LANES).rev() {
                 let id = self.movers.ids[at];
-                if id != ABSENT && self.now.wrapping_sub(self.moved[id as usize]) >= REST {
+                if id != ABSENT && self.now.wrapping_sub(self.moved[id as usize]) >= SETTLED {
                     let bounds = self.movers.blocks[leaf].get(at % LANES);
                     if self.rest(self.leaf_for(&bounds), id, &bounds) {
                         self.remove(at);
@@ -477,7 +478,7 @@ impl RegionIndex for Moving {
             }
             self.update(id, &items[id as usize]);
         }
-        self.settle(moved.len());
+        self.settle_movers(moved.len());
         self.still.fit_above(std::mem::take(&mut self.left));
         self.movers.fit_above(std::mem::take(&mut self.changed));
         true

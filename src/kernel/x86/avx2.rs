@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::packer::{PackTo, Packer};
+use super::appender::{Appender, CompressTo};
 use crate::kernel::Work;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
@@ -53,11 +53,11 @@ impl Isa for Avx2 {
     type Words = Words;
     /// All bits where a lane is dropped.
     type Kept = Floats;
-    type Packer<'a> = Packer<'a>;
+    type Appender<'a> = Appender<'a>;
 
     #[inline(always)]
-    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
-        unsafe { apart(self, piece) }
+    fn run_outlined<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { run_outlined(self, piece) }
     }
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> Floats {
@@ -148,14 +148,14 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn compress(self, place: &mut [u32; LANES], words: Words, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
-        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+        unsafe { self.compress_to(place.as_mut_ptr(), words, lanes) };
     }
 }
 
 // SAFETY: one word per lane is written, never more than a row.
-unsafe impl PackTo for Avx2 {
+unsafe impl CompressTo for Avx2 {
     #[inline(always)]
-    unsafe fn pack_to(self, place: *mut u32, words: Words, lanes: LaneMask) {
+    unsafe fn compress_to(self, place: *mut u32, words: Words, lanes: LaneMask) {
         // Each store is a whole vector: the second one overwrites what the first left behind its
         // lanes. Together they stay within sixteen places.
         let (low, high) = (lanes & 0xff, lanes >> 8);

@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
+use super::appender::{Appender, CompressTo};
 use super::avx2::halves_of_pairs;
-use super::packer::{PackTo, Packer};
 use crate::kernel::Work;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
@@ -32,11 +32,11 @@ impl Isa for Avx512 {
     type Floats = __m512;
     type Words = __m512i;
     type Kept = LaneMask;
-    type Packer<'a> = Packer<'a>;
+    type Appender<'a> = Appender<'a>;
 
     #[inline(always)]
-    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
-        unsafe { apart(self, piece) }
+    fn run_outlined<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { run_outlined(self, piece) }
     }
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> __m512 {
@@ -121,14 +121,14 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn compress(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
-        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+        unsafe { self.compress_to(place.as_mut_ptr(), words, lanes) };
     }
 }
 
 // SAFETY: one word per lane is written, never more than a row.
-unsafe impl PackTo for Avx512 {
+unsafe impl CompressTo for Avx512 {
     #[inline(always)]
-    unsafe fn pack_to(self, place: *mut u32, words: __m512i, lanes: LaneMask) {
+    unsafe fn compress_to(self, place: *mut u32, words: __m512i, lanes: LaneMask) {
         // Compressed in a register and stored whole: a masked store is slower, far slower on some
         // processors.
         unsafe {

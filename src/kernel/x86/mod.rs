@@ -22,17 +22,17 @@ macro_rules! instruction_set {
 
         #[inline(never)]
         #[target_feature(enable = $features)]
-        fn apart<P: Piece<$Set>>(isa: $Set, piece: P) -> P::Output {
+        fn run_outlined<P: Piece<$Set>>(isa: $Set, piece: P) -> P::Output {
             piece.run(isa)
         }
     };
 }
 
+mod appender;
 mod avx2;
 mod avx512;
-mod packer;
 
-pub use packer::{extend, extend_from_range};
+pub use appender::{extend, extend_from_range};
 
 use super::{Kernel, Plain, Work};
 

@@ -8,14 +8,19 @@ use crate::geometry::Aabb;
 use crate::index::{
     BuildError, Info, Input, Linear, MemoryUsage, NoParams, RegionIndex, Registry, StructureSpec,
 };
-use crate::measure::{Group, Known, SceneInfo};
+use crate::measure::{Group, ReferenceResults, SceneInfo};
 use crate::motion::Motion;
 use crate::path;
 use crate::query::{Context, ItemId, QueryVolume};
 use crate::scene;
 
 /// A part of a motion in a small city, with two queries per frame.
-fn part(specs: &[StructureSpec], motion: &str, test: CullingTest, known: Option<&Known>) -> Part {
+fn part(
+    specs: &[StructureSpec],
+    motion: &str,
+    test: CullingTest,
+    known: Option<&ReferenceResults>,
+) -> Part {
     let scene = scene::load("city:n=300", &Default::default()).unwrap();
     let way = path::load("orbit:frames=7", &scene, &Default::default()).unwrap();
     let culling = Culling {

@@ -32,7 +32,7 @@ fn subjects(names: &str, scene: &Scene) -> Vec<Subject> {
     specs.into_iter().map(build).collect()
 }
 
-fn measured(names: &str, process: u32, known: Option<&Known>, plan_only: bool) -> Part {
+fn measured(names: &str, process: u32, known: Option<&ReferenceResults>, plan_only: bool) -> Part {
     let scene = scene();
     let (workload, subjects) = (workload(&scene), subjects(names, &scene));
     let info = SceneInfo::of(&scene);
@@ -85,7 +85,7 @@ fn a_process_that_only_plans_times_nothing() {
 fn an_answer_of_another_digest_is_wrong() {
     let first = measured("linear,bvh", 0, None, true);
     let known = first.known.expect("a plan");
-    let of = |change: &dyn Fn(&mut Known)| {
+    let of = |change: &dyn Fn(&mut ReferenceResults)| {
         let mut stale = known.clone();
         change(&mut stale);
         let part = measured("linear,bvh", 1, Some(&stale), false);

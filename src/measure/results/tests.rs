@@ -56,7 +56,7 @@ fn parts(times: &[Times]) -> Vec<Part> {
             keys,
         })
     };
-    let known = Known {
+    let known = ReferenceResults {
         visible: vec![answer; CAMERAS as usize],
         located: vec![answer; CAMERAS as usize],
         query: schedule(|task| task == TaskKind::Query),

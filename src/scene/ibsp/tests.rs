@@ -120,7 +120,7 @@ fn entities_are_read_as_the_engine_reads_them() {
 #[test]
 fn each_spawn_point_lies_in_an_open_leaf_and_its_box() {
     let scene = read(MAP).unwrap();
-    let found = |p: DVec3| scene.holding(&scene.sought(p));
+    let found = |p: DVec3| scene.holding(&scene.search_point(p));
     let at = |x: f64, y: f64, z: f64| found(DVec3::new(x, y, z));
     let map = map_of(&scene);
     for (place, leaf) in scene.places.iter().zip([0, 1, 2]) {
@@ -253,7 +253,7 @@ fn no_truncation_and_no_flipped_byte_panics() {
         let kept = bytes[at];
         for value in [0, 0x7F, 0x80, 0xFF] {
             bytes[at] = value;
-            let _ = read(&bytes).map(|scene| scene.holding(&scene.sought(DVec3::ONE)));
+            let _ = read(&bytes).map(|scene| scene.holding(&scene.search_point(DVec3::ONE)));
         }
         bytes[at] = kept;
     }

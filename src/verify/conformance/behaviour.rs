@@ -311,10 +311,10 @@ pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
         }
         let pool = Pool::new(3);
         let shared: T = build_from(&Input::new(&queries.items).pool(&pool))?;
-        let was_asked = pool.was_asked();
-        ensure(was_asked == says.threaded_build, || {
+        let was_used = pool.was_used();
+        ensure(was_used == says.threaded_build, || {
             let says = says.threaded_build;
-            format!("declares threaded-build: {says}, yet its build asks for threads: {was_asked}")
+            format!("declares threaded-build: {says}, yet its build asks for threads: {was_used}")
         })?;
         ensure(queries.answers(&shared) == queries.answers(index), || {
             "built on three threads, answered differently".to_owned()

@@ -115,7 +115,7 @@ fn movers_that_rest_return_to_the_still_tree() {
     let mut items = cubes(&mut rng, 5000);
     let mut index = Moving::build(&Input::new(&items), &Default::default()).unwrap();
     let all: Vec<ItemId> = (0..5000).collect();
-    for _ in 0..LEAVING + 2 {
+    for _ in 0..LEAVE_EVERY + 2 {
         for b in &mut items {
             *b = Aabb::new(b.min + 0.1, b.max + 0.1);
         }

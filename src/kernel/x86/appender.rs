@@ -4,18 +4,18 @@
 
 use std::ops::Range;
 
-use crate::kernel::isa::{Isa, LANES, LaneMask, Pack};
+use crate::kernel::isa::{Append, Isa, LANES, LaneMask};
 
 /// Instructions that compress words into memory that may be uninitialised.
 ///
 /// # Safety
-/// [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the sixteenth place.
-pub unsafe trait PackTo: Isa {
+/// [`CompressTo::compress_to`] writes the words of all lanes, and nothing behind the sixteenth place.
+pub unsafe trait CompressTo: Isa {
     /// Moves the words of `lanes` together, lowest first, to `place`.
     ///
     /// # Safety
     /// `place` is valid for writes of [`LANES`] words.
-    unsafe fn pack_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
+    unsafe fn compress_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
 }
 
 /// `Vec::reserve`, which is a call even where there is room.
@@ -72,7 +72,7 @@ pub fn extend_from_range(out: &mut Vec<u32>, words: &[u32], places: Range<usize>
 }
 
 /// The memory behind a list.
-pub struct Packer<'a> {
+pub struct Appender<'a> {
     out: &'a mut Vec<u32>,
     /// Address of the next word; `room` words fit from there.
     end: *mut u32,
@@ -80,12 +80,12 @@ pub struct Packer<'a> {
     added: usize,
 }
 
-impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
+impl<'a, I: CompressTo> Append<'a, I> for Appender<'a> {
     #[inline(always)]
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
         let room = words + LANES;
         make_room(out, room);
-        Packer {
+        Appender {
             end: out.spare_capacity_mut().as_mut_ptr().cast(),
             room,
             added: 0,
@@ -99,7 +99,7 @@ impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
         let count = lanes.count_ones() as usize;
         // SAFETY: a row fits, and `count` is at most a row.
         self.end = unsafe {
-            isa.pack_to(self.end, isa.words(row), lanes);
+            isa.compress_to(self.end, isa.words(row), lanes);
             self.end.add(count)
         };
         self.room -= count;
@@ -107,7 +107,7 @@ impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
     }
 }
 
-impl Drop for Packer<'_> {
+impl Drop for Appender<'_> {
     #[inline(always)]
     fn drop(&mut self) {
         // SAFETY: `added` words have been written behind the old end, within the
