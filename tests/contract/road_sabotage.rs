@@ -11,7 +11,8 @@ use cullbench::index::{
     BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
 };
 use cullbench::measure::{
-    Group, GroupPlan, Known, Part, Protocol, SceneInfo, Status, Subject, Workload, measure,
+    Group, GroupPlan, Part, Protocol, ReferenceResults, SceneInfo, Status, Subject, Workload,
+    measure,
 };
 use cullbench::path;
 use cullbench::query::{Context, ItemId, QueryVolume, Recorder};
@@ -140,7 +141,7 @@ fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
 }
 
 /// Result of one process.
-fn part(process: u32, known: Option<&Known>) -> Part {
+fn part(process: u32, known: Option<&ReferenceResults>) -> Part {
     let scene = scene();
     let (workload, subjects) = (workload(&scene), subjects("linear,bvh,octree", &scene));
     let info = SceneInfo::of(&scene);

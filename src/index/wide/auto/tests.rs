@@ -311,12 +311,12 @@ fn queries_between_updates_are_counted_up_to_a_number() {
     let mut rng = Pcg64::seed_from_u64(10);
     let items = cubes(&mut rng, 100);
     let mut index = built(&items, "");
-    for queries in [3, 2 * MOST_ASKED] {
+    for queries in [3, 2 * MOST_QUERIES] {
         for _ in 0..queries {
             index.locate(Vec3::ONE);
             index.counted(&Vec3::ONE);
         }
-        assert_eq!(index.asked.load(Relaxed), queries.min(MOST_ASKED));
+        assert_eq!(index.queries.load(Relaxed), queries.min(MOST_QUERIES));
         assert!(index.refit(&items, &[1]));
     }
 }
