@@ -97,13 +97,13 @@ impl ViewProjection {
     }
 
     /// Returns whether the matrix is a view alone: unit axes, and w is 1 everywhere.
-    pub fn is_view_alone(&self) -> bool {
+    pub fn is_view_only(&self) -> bool {
         let is_unit = |row: &[f64; 4]| (DVec3::from_slice(row).length() - 1.0).abs() < STRAIGHT;
         self.rows[..3].iter().all(is_unit) && self.rows[3] == [0.0, 0.0, 0.0, 1.0]
     }
 
     /// Returns whether it is a projection alone: the eye at 0, axes of the world.
-    pub fn is_projection_alone(&self) -> bool {
+    pub fn is_lens_only(&self) -> bool {
         let [x, y, z, w] = self.rows;
         [x[1], x[3], y[0], y[3], z[0], z[1], w[0], w[1], w[3]] == [0.0; 9]
     }
@@ -195,7 +195,7 @@ mod tests {
         Camera::of_matrix(convention.in_columns(rows), convention).expect("a camera")
     }
 
-    fn unprojected_all(camera: &Camera) -> Unprojected {
+    fn decomposed(camera: &Camera) -> Unprojected {
         let matrix = camera.lens.matrix().expect("a matrix stays one");
         matrix.unprojected().expect("a lens")
     }
@@ -252,7 +252,7 @@ mod tests {
                         // Without an eye the name of the convention decides.
                         let parallel = lens.is_orthographic();
                         let is_swapped = parallel && ![name, name.transposed()].contains(&named);
-                        let found = unprojected_all(&read);
+                        let found = decomposed(&read);
                         let side = if is_swapped { -1.0 } else { 1.0 };
                         let [near, far] = depths;
                         let wanted = if is_swapped { [far, near] } else { depths };
@@ -276,7 +276,7 @@ mod tests {
 
     /// Checks the image's axes up to their signs, the lens, and the camera of the rays.
     fn check(read: &Camera, lens: &Lens, frame: &Frame, slack: f64, what: &str) {
-        let found = unprojected_all(read);
+        let found = decomposed(read);
         assert!(found.shear < 1e-5 && found.tilt < 1e-5, "{what}");
         assert_eq!(
             read.lens.is_orthographic(),
@@ -311,7 +311,7 @@ mod tests {
         for (clip, convention, up) in names {
             let matrix = flip * lens.projection(clip) * frame.world_to_eye();
             let camera = read(matrix, convention);
-            let found = unprojected_all(&camera);
+            let found = decomposed(&camera);
             assert!(found.is_mirrored);
             assert!((found.camera.frame.v() - frame.v() * up).length() < 1e-12);
             assert!(difference(&found.camera.lens, &lens) < 1e-12);

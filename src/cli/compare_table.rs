@@ -13,7 +13,7 @@ use super::shared_args::TableFormat;
 use super::{Ending, print_json, program, text};
 use crate::measure::{GroupKey, METRICS};
 use crate::report::{
-    Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Outcome, Setting, UnmatchedCell, WORK,
+    Basis, Changes, CommonShift, FEW_OTHERS, JudgedRow, Outcome, Setting, Unpaired, WORK,
     WorkChange, grouped, unique,
 };
 use crate::statistics::{Change, Judgement, median};
@@ -194,7 +194,7 @@ impl CompareTable<'_> {
         lines.extend(lone_lines("OLD", &changes.only_in_old));
         lines.extend(lone_lines("NEW", &changes.only_in_new));
         let mut lone = changes.only_in_old.iter().chain(&changes.only_in_new);
-        let is_company = |cell: &UnmatchedCell| {
+        let is_company = |cell: &Unpaired| {
             let mut rows = changes.rows.iter();
             rows.any(|row| row.cell.group == cell.cell.group)
         };
@@ -478,7 +478,7 @@ fn shown(metric: &str, value: f64) -> String {
 }
 
 /// "3 cells (bvh on city, orbit, six-plane, ...)".
-pub fn counted(cells: &[UnmatchedCell]) -> String {
+pub fn counted(cells: &[Unpaired]) -> String {
     let Some(first) = cells.first() else {
         return "no cells".to_owned();
     };
@@ -488,7 +488,7 @@ pub fn counted(cells: &[UnmatchedCell]) -> String {
 }
 
 /// Number of cells of only one side; wrong ones each by name.
-fn lone_lines(side: &str, cells: &[UnmatchedCell]) -> Vec<String> {
+fn lone_lines(side: &str, cells: &[Unpaired]) -> Vec<String> {
     let all = (!cells.is_empty()).then(|| format!("only in {side}: {}", counted(cells)));
     let wrong = cells.iter().filter(|cell| cell.status.is_failure());
     let wrong = wrong.map(|cell| {

@@ -132,10 +132,7 @@ fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SearchPoint>> {
              with places, such as a map",
             scene.name
         );
-        let eyes = scene
-            .places
-            .iter()
-            .map(|place| scene.search_point(place.eye));
+        let eyes = scene.places.iter().map(|at| scene.search_point(at.eye));
         return Ok(eyes.collect());
     }
     let points = read_points_csv(&read_file(file)?[..], &file.display().to_string())?.into_iter();

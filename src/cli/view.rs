@@ -88,7 +88,7 @@ pub fn view(registry: &Registry, args: &ViewArgs) -> anyhow::Result<Ending> {
     let ends = args
         .samples
         .map(|grid| (RayTargets::of(&Shape::of(&scene), None), grid));
-    let downward = path::is_downward(&path::unprojected_all(&cameras.cameras), scene.up);
+    let downward = path::is_downward(&path::decomposed(&cameras.cameras), scene.up);
     let (mut totals, mut frames) = ([0; KINDS], Vec::new());
     for (view, answer) in answers.iter().enumerate() {
         let camera = &cameras.cameras[view];
@@ -439,7 +439,7 @@ mod tests {
                 (by_rows, MatrixConvention::RowD3d),
             ] {
                 let camera = [Camera::of_matrix(entries, convention).unwrap()];
-                let downward = path::is_downward(&path::unprojected_all(&camera), UpAxis::Z);
+                let downward = path::is_downward(&path::decomposed(&camera), UpAxis::Z);
                 let seen = clip_matrix(&camera[0], DVec3::ZERO, downward) * above;
                 assert!(seen.y > 0.0, "{x}, {y}: {seen}");
                 let matrix = CameraFacts::of(&camera, UpAxis::Z).matrix.unwrap();

@@ -58,12 +58,12 @@ pub struct MatrixFacts {
 /// A camera and the decomposition of its matrix.
 ///
 /// `None` for other cameras and for a matrix without a lens.
-type UnprojectedCamera<'a> = (&'a Camera, Option<Box<Unprojected>>);
+type Decomposed<'a> = (&'a Camera, Option<Box<Unprojected>>);
 
 /// Decomposes matrices into frames and lenses, once for all facts and warnings.
 ///
 /// Computed exactly.
-pub fn unprojected_all(cameras: &[Camera]) -> Vec<UnprojectedCamera<'_>> {
+pub fn decomposed(cameras: &[Camera]) -> Vec<Decomposed<'_>> {
     let of = |camera: &Camera| Some(Box::new(camera.lens.matrix()?.unprojected().ok()?));
     cameras.iter().map(|camera| (camera, of(camera))).collect()
 }
@@ -71,8 +71,8 @@ pub fn unprojected_all(cameras: &[Camera]) -> Vec<UnprojectedCamera<'_>> {
 impl CameraFacts {
     /// Facts of the cameras of a path, in a scene with an up axis.
     pub fn of(cameras: &[Camera], up: UpAxis) -> CameraFacts {
-        let taken = unprojected_all(cameras);
-        let one = |(camera, found): &UnprojectedCamera| {
+        let taken = decomposed(cameras);
+        let one = |(camera, found): &Decomposed| {
             // For a matrix without a lens, the matrix itself.
             let own = |found: &Unprojected| found.camera.lens;
             let lens = found.as_deref().map_or(camera.lens, own);
@@ -113,7 +113,7 @@ impl CameraFacts {
 }
 
 impl MatrixFacts {
-    fn of(taken: &[UnprojectedCamera], up: UpAxis) -> Option<MatrixFacts> {
+    fn of(taken: &[Decomposed], up: UpAxis) -> Option<MatrixFacts> {
         let (camera, found) = taken.first()?;
         let (matrix, found) = (camera.lens.matrix()?, found.as_ref()?);
         let (frame, [x, y]) = (found.camera.frame, found.image);
@@ -139,13 +139,13 @@ impl MatrixFacts {
 ///
 /// The up axis of the scene decides, since an image is also mirrored in a left-handed world.
 /// Cameras that look straight down prove neither, and OpenGL has y upward.
-pub fn is_downward(taken: &[UnprojectedCamera], up: UpAxis) -> bool {
+pub fn is_downward(taken: &[Decomposed], up: UpAxis) -> bool {
     let mut matrices = taken.iter().filter_map(|(camera, _)| camera.lens.matrix());
     matrices.all(ViewProjection::is_from_zero) && upward(taken, up) < -SLANTED
 }
 
 /// Mean of the y axes of mirrored images along the up axis; NaN without any.
-fn upward(taken: &[UnprojectedCamera], up: UpAxis) -> f64 {
+fn upward(taken: &[Decomposed], up: UpAxis) -> f64 {
     let found = taken.iter().filter_map(|(_, found)| found.as_ref());
     let mirrored = found.filter(|found| found.is_mirrored);
     let along = mirrored.map(|found| found.image[1].dot(up.vector()));
@@ -175,7 +175,7 @@ const FAR_OUTSIDE: f64 = 3.0;
 
 /// One line for each kind of warning about the cameras of a path.
 pub fn warnings(scene: &Scene, path: &str, cameras: &[Camera]) -> Vec<String> {
-    let (taken, told) = (unprojected_all(cameras), |doubt| format!("{path}: {doubt}"));
+    let (taken, told) = (decomposed(cameras), |doubt| format!("{path}: {doubt}"));
     // Axes and eye of a matrix that is read wrongly mean nothing.
     if let Some(only) = transposed(&taken) {
         return vec![told(only)];
@@ -236,23 +236,23 @@ fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
 ///
 /// A view matrix alone sees two units of width and height.
 fn bare(cameras: &[Camera]) -> Option<String> {
-    let is_projection_alone = |camera: &Camera| {
+    let is_lens = |camera: &Camera| {
         camera
             .lens
             .matrix()
-            .is_some_and(ViewProjection::is_projection_alone)
+            .is_some_and(ViewProjection::is_lens_only)
     };
-    if cameras.len() > 1 && cameras.iter().all(is_projection_alone) {
+    if cameras.len() > 1 && cameras.iter().all(is_lens) {
         let what = "all matrices with the eye at 0 and the axes of the world, as without a view";
         return Some(format!("{what}; expected projection x view"));
     }
-    let is_view_alone = |camera: &&Camera| {
+    let is_view = |camera: &&Camera| {
         camera
             .lens
             .matrix()
-            .is_some_and(ViewProjection::is_view_alone)
+            .is_some_and(ViewProjection::is_view_only)
     };
-    let what = share_of(cameras, is_view_alone)?;
+    let what = share_of(cameras, is_view)?;
     Some(format!(
         "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
     ))
@@ -283,8 +283,8 @@ fn upward_parallel(scene: &Scene, cameras: &[Camera]) -> Option<String> {
 }
 
 /// Cameras whose up in the image is more than 45 degrees from the scene's.
-fn rolled(scene: &Scene, taken: &[UnprojectedCamera]) -> Option<String> {
-    let axes = |(camera, found): &UnprojectedCamera| {
+fn rolled(scene: &Scene, taken: &[Decomposed]) -> Option<String> {
+    let axes = |(camera, found): &Decomposed| {
         let own = camera.lens.matrix().is_none().then_some(camera.frame);
         let frame = found.as_ref().map(|found| found.camera.frame).or(own)?;
         // A mirrored image may have y downward.
@@ -325,8 +325,8 @@ fn rolled(scene: &Scene, taken: &[UnprojectedCamera]) -> Option<String> {
 }
 
 /// Matrices that never reach depth -1: probably reversed, with depths from 0 to 1.
-fn shallow(taken: &[UnprojectedCamera]) -> Option<String> {
-    let is_shallow = |one: &&UnprojectedCamera| {
+fn shallow(taken: &[Decomposed]) -> Option<String> {
+    let is_shallow = |one: &&Decomposed| {
         let Camera { frame, lens } = one.0;
         // An oblique near plane has depth -1, and often no far plane.
         let is_read = lens.far().is_none() && !is_sheared(one);
@@ -342,12 +342,12 @@ fn shallow(taken: &[UnprojectedCamera]) -> Option<String> {
 }
 
 /// Returns whether a matrix, as it is read, has no right angles.
-fn is_sheared((_, found): &&UnprojectedCamera) -> bool {
+fn is_sheared((_, found): &&Decomposed) -> bool {
     found.as_ref().is_some_and(|found| found.is_sheared())
 }
 
 /// Matrices that are no camera's, if all their transposes are.
-fn transposed(taken: &[UnprojectedCamera]) -> Option<String> {
+fn transposed(taken: &[Decomposed]) -> Option<String> {
     let sheared = taken.iter().filter(is_sheared);
     let mut sheared = sheared.filter_map(|(camera, _)| camera.lens.matrix());
     let convention = sheared.clone().next()?.convention();
@@ -366,7 +366,7 @@ fn transposed(taken: &[UnprojectedCamera]) -> Option<String> {
 }
 
 /// Matrices that are no camera's.
-fn sheared(taken: &[UnprojectedCamera]) -> Option<String> {
+fn sheared(taken: &[Decomposed]) -> Option<String> {
     let what = share_of(taken, is_sheared)?;
     Some(format!(
         "{what} sheared, or with an oblique near plane: image axes or depths at no right angles"
@@ -374,10 +374,10 @@ fn sheared(taken: &[UnprojectedCamera]) -> Option<String> {
 }
 
 /// Matrices of a left-handed world with a scene whose format is right-handed.
-fn left_handed(scene: &Scene, taken: &[UnprojectedCamera]) -> Option<String> {
+fn left_handed(scene: &Scene, taken: &[Decomposed]) -> Option<String> {
     let is_right_handed = scene.unit.is_some() || scene.surfaces.is_some();
     // For parallel rays the near end of depth is unknown, and it decides this.
-    let is_mirrored = |(camera, found): &UnprojectedCamera| {
+    let is_mirrored = |(camera, found): &Decomposed| {
         let found = found.as_ref().filter(|_| !camera.lens.is_orthographic());
         found.is_some_and(|found| found.is_mirrored)
     };

@@ -22,7 +22,7 @@ use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
 pub use facts::{CameraFacts, MatrixFacts};
-pub(crate) use facts::{is_downward, unprojected_all, warnings};
+pub(crate) use facts::{decomposed, is_downward, warnings};
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 
 /// The path through a scene if none is named.

@@ -9,7 +9,7 @@ use std::{fmt, slice};
 use serde::Serialize;
 
 use super::judging::{
-    COUNTERS, Changes, CommonShift, JudgedRow, Outcome, UnmatchedCell, WORK, WorkChange,
+    COUNTERS, Changes, CommonShift, JudgedRow, Outcome, Unpaired, WORK, WorkChange,
 };
 use super::ranking::{
     Pair, answer_difference, grouped, matched, query_difference, work_difference,
@@ -107,8 +107,8 @@ fn work_changes((old, new): Pair) -> impl Iterator<Item = WorkChange> {
     })
 }
 
-fn lone(cell: &ReportCell) -> UnmatchedCell {
-    UnmatchedCell {
+fn lone(cell: &ReportCell) -> Unpaired {
+    Unpaired {
         cell: cell.key(),
         status: cell.status,
         reason: cell.reason.clone(),

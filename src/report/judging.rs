@@ -184,7 +184,7 @@ pub struct WorkChange {
 
 /// A cell that the other report does not have.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct UnmatchedCell {
+pub struct Unpaired {
     /// The cell in the report that has it.
     #[serde(flatten)]
     pub cell: CellKey,
@@ -223,9 +223,9 @@ pub struct Changes {
     /// Differences of counters: exact, without a verdict.
     pub work_changed: Vec<WorkChange>,
     /// Cells that only the old report has.
-    pub only_in_old: Vec<UnmatchedCell>,
+    pub only_in_old: Vec<Unpaired>,
     /// Cells that only the new report has.
-    pub only_in_new: Vec<UnmatchedCell>,
+    pub only_in_new: Vec<Unpaired>,
     /// Shifts of each metric between two reports; empty for alternating programs.
     ///
     /// First that of all groups, then of each group proven to have moved relative to the others.

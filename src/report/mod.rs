@@ -23,9 +23,7 @@ pub use experiment::Experiment;
 pub(crate) use folder::save_page;
 pub use folder::{RunFolder, StoppedRun, save_report};
 pub(crate) use judging::WORK;
-pub use judging::{
-    Changes, CommonShift, JUDGED_METRICS, JudgedRow, Outcome, UnmatchedCell, WorkChange,
-};
+pub use judging::{Changes, CommonShift, JUDGED_METRICS, JudgedRow, Outcome, Unpaired, WorkChange};
 pub use merge::{Merged, merge};
 pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION};
 pub use ranking::{Comparison, comparisons};

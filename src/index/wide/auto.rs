@@ -329,11 +329,7 @@ impl Auto {
         let moved = std::mem::take(&mut self.moved);
         let queries = f64::from(std::mem::take(self.queries.get_mut()));
         // Queries before the first update belong to no frame.
-        let queries = if before == 0 {
-            1.0
-        } else {
-            queries.max(updates)
-        };
+        let queries = [queries.max(updates), 1.0][usize::from(before == 0)];
         let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
         // Approximate number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
