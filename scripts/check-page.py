@@ -7,9 +7,9 @@ For each page but those of `view`, at 390, 1,400 and 1,800 px, light and dark: n
 console, nothing loaded from elsewhere, nothing wider than the window, every figure has marks, texts
 of a figure stay on the page; first paint within a second, and no more than 2 MB. Filter, sorting
 and the state in the hash of the address work. A page of `view` decodes its views, its keys work,
-and 20,000 boxes are drawn at 30 frames per second by software rendering on one core (by processor
-time). --shots keeps pictures of each. The program is `chromium`, or $CHROMIUM.
-Standard library only.
+and the time of a frame of 20,000 boxes by software rendering on one core is printed (of processor
+time, at most 33 ms on a free core); half as much again is a fault. --shots keeps pictures of each.
+The program is `chromium`, or $CHROMIUM. Standard library only.
 """
 
 import argparse
@@ -28,6 +28,8 @@ SCHEMES = ["light", "dark"]
 LONGEST_PAINT_MS = 1000
 # Of a page of `view` with so many items, 30 frames per second of one core.
 LONGEST_FRAME_MS, MOST_ITEMS = 1000 / 30, 20_000
+# Shared machines are slower by up to this.
+ALLOWANCE = 1.5
 
 # Faults of a page as it is shown, as a list of sentences. A narrow window reports the width of
 # what does not fit into it: innerWidth stands for the width asked for.
@@ -300,8 +302,8 @@ def check(browser, page, shots, most_mb):
     if browser.value("!!document.getElementById('now')"):
         faults += browser.value(KEYS) + list(browser.complaints())
         items, (afar, through) = browser.value("scene.data.items"), frame_times(url)
-        if max(afar, through) > LONGEST_FRAME_MS and items <= MOST_ITEMS:
-            faults.append(f"expected at most {LONGEST_FRAME_MS:.0f} ms per frame")
+        if max(afar, through) > ALLOWANCE * LONGEST_FRAME_MS and items <= MOST_ITEMS:
+            faults.append(f"expected at most {ALLOWANCE * LONGEST_FRAME_MS:.0f} ms per frame")
         what = f"{items} boxes, {afar:.0f} ms per frame from afar, {through:.0f} ms through the camera"
         return said(page, size, faults, what)
     paints = []
