@@ -1,9 +1,7 @@
 //! Picking at the cursors of every view.
 //!
-//! Every back end finds the first and the nearest items along rays; every structure of the object
-//! stage finds everything in the frustum of a cursor. All answers are compared with the exact ones.
-
-use std::rc::Rc;
+//! Every back end finds the first item along rays; every structure of the object stage finds
+//! everything in the frustum of a cursor. All answers are compared with the exact ones.
 
 use serde::Serialize;
 
@@ -17,7 +15,7 @@ use crate::measure::QueryFn;
 use crate::query::{ItemId, distinct};
 use crate::shown::{count, counted};
 use crate::statistics::{Estimate, flat};
-use crate::visibility::pick::{CursorRectangle, Pick};
+use crate::visibility::pick::{CursorRectangle, PickTruth};
 use crate::visibility::truth::{Bodies, Body, Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
@@ -27,8 +25,6 @@ const CURSORS: SampleGrid = SampleGrid::new(16, 9);
 const MOST_FOR_LOOP: usize = 20_000;
 /// Half width of a cursor's frustum, pixels.
 const REACH: f64 = 4.0;
-/// Number of nearest items requested.
-pub const NEAREST: usize = 8;
 
 /// Results of one picking back end over all views.
 #[derive(Clone, Default, Debug, Serialize)]
@@ -107,7 +103,7 @@ impl<'w> Picks<'w> {
         picks
     }
 
-    /// Adds the ray back ends: rows for the first item, then for the nearest.
+    /// Adds the ray back ends.
     fn add_rays<B: Body>(&mut self, all: &Bodies<B>, one: &str) {
         let bodies = all.all.len();
         for row in Bodies::<B>::BACK_ENDS {
@@ -115,24 +111,18 @@ impl<'w> Picks<'w> {
                 self.leave_out(row.name, bodies, one, "for each ray");
                 continue;
             }
-            let pick: Rc<dyn Pick> = Rc::from((row.build)(all, self.setup.kernel));
-            for question in [PickQuestion::First, PickQuestion::Nearest] {
-                let pick = pick.clone();
-                let answer: PickAnswer = Box::new(move |cursor, out| match question {
-                    PickQuestion::First => out.extend(pick.first(&cursor.ray)),
-                    _ => pick.nearest(&cursor.ray, NEAREST, out),
-                });
-                let declared = PickRow {
-                    question,
-                    name: row.name.to_owned(),
-                    summary: row.summary,
-                    guarantee: row.guarantee,
-                    ..PickRow::default()
-                };
-                self.pickers.push((declared, answer));
-            }
+            let pick = (row.build)(all, self.setup.kernel);
+            let first: PickAnswer =
+                Box::new(move |cursor, out| out.extend(pick.first(&cursor.ray)));
+            let declared = PickRow {
+                question: PickQuestion::First,
+                name: row.name.to_owned(),
+                summary: row.summary,
+                guarantee: row.guarantee,
+                ..PickRow::default()
+            };
+            self.pickers.push((declared, first));
         }
-        self.pickers.sort_by_key(|(row, _)| row.question);
     }
 
     /// Adds the structures of the object stage, queried with the cursors' frusta.
@@ -185,7 +175,7 @@ impl<'w> Picks<'w> {
     /// The exact answers come from the tree that wide-ray searches too; in small enough scenes,
     /// linear, which shares nothing with that tree, is compared as well.
     pub fn compared(&self) -> Vec<PickRow> {
-        let exact: Box<dyn Pick> = match &self.setup.shape {
+        let exact: Box<dyn PickTruth> = match &self.setup.shape {
             Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),
             Shape::Triangles(surfaces) => {
                 let facets = Facets::solid(surfaces, self.setup.items());
@@ -209,18 +199,15 @@ impl<'w> Picks<'w> {
         rows
     }
 
-    fn truth(&self, exact: &dyn Pick, rays: &Rays, cursor: &Cursor) -> PickTruth {
+    fn truth(&self, exact: &dyn PickTruth, rays: &Rays, cursor: &Cursor) -> CursorTruth {
         let scene = self.setup.scene;
         let is_small = scene.items.len() <= MOST_FOR_LOOP;
         let in_planes = cursor.volume.as_ref().filter(|_| is_small).map(|volume| {
             let ids = (0..).zip(&scene.items).filter(|(_, b)| volume.sees(b));
             ids.map(|(id, _)| id).collect()
         });
-        let mut nearest = Vec::new();
-        exact.nearest(&cursor.ray, NEAREST, &mut nearest);
-        PickTruth {
+        CursorTruth {
             first: Vec::from_iter(exact.first(&cursor.ray)),
-            nearest,
             met: met_within(exact, rays, &cursor.rectangle),
             in_planes,
         }
@@ -246,10 +233,8 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
 }
 
 /// Exact answers at a cursor.
-struct PickTruth {
+struct CursorTruth {
     first: Vec<ItemId>,
-    /// Sorted by depth, then by id.
-    nearest: Vec<ItemId>,
     /// Items met by sample rays through the rectangle, ascending: a lower bound.
     met: Vec<ItemId>,
     /// Items that no plane of the rectangle's frustum excludes, ascending.
@@ -258,12 +243,11 @@ struct PickTruth {
     in_planes: Option<Vec<ItemId>>,
 }
 
-impl PickTruth {
+impl CursorTruth {
     /// Returns `true` if an answer is exact; sorts an answer that is a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
             PickQuestion::First => *answer == self.first[..],
-            PickQuestion::Nearest => *answer == self.nearest[..],
             PickQuestion::Through => {
                 answer.sort_unstable();
                 let has = |item: &ItemId| answer.binary_search(item).is_ok();
@@ -275,13 +259,13 @@ impl PickTruth {
 }
 
 /// Items met by rays through corners, edge midpoints and centre of a rectangle.
-fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
+fn met_within(exact: &dyn PickTruth, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
     let CursorRectangle { min, max } = rectangle;
     let middle = [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
     let mut met = Vec::new();
     for x in [min[0], middle[0], max[0]] {
         for y in [min[1], middle[1], max[1]] {
-            exact.nearest(&rays.through(x, y), usize::MAX, &mut met);
+            met.extend(exact.met(&rays.through(x, y)));
         }
     }
     distinct(met)
@@ -294,21 +278,17 @@ mod tests {
     /// A missing item, an extra item or a different order makes an answer wrong.
     #[test]
     fn answers_are_held_against_the_exact_ones() {
-        let truth = PickTruth {
+        let truth = CursorTruth {
             first: vec![4],
-            nearest: vec![4, 2, 9],
             met: vec![2, 4],
             in_planes: Some(vec![2, 4, 9]),
         };
         let agrees = |question, answer: &[ItemId]| truth.agrees(question, &mut answer.to_vec());
         assert!(agrees(PickQuestion::First, &[4]));
         assert!(!agrees(PickQuestion::First, &[2]) && !agrees(PickQuestion::First, &[]));
-        assert!(agrees(PickQuestion::Nearest, &[4, 2, 9]));
-        assert!(!agrees(PickQuestion::Nearest, &[2, 4, 9]));
-        assert!(!agrees(PickQuestion::Nearest, &[4, 2]));
         assert!(agrees(PickQuestion::Through, &[9, 4, 2]));
         assert!(!agrees(PickQuestion::Through, &[4, 2]));
-        let large = PickTruth {
+        let large = CursorTruth {
             in_planes: None,
             ..truth
         };

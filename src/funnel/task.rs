@@ -17,9 +17,6 @@ named! {
         #[default]
         #[serde(rename = "first item")]
         First = "first item",
-        /// Nearest few items along the ray, with all at the depth of the last of them.
-        #[serde(rename = "nearest 8")]
-        Nearest = "nearest 8",
         /// All items in the frustum of a small rectangle around the cursor.
         #[serde(rename = "all within 4 pixels")]
         Through = "all within 4 pixels",

@@ -17,7 +17,6 @@ fn back_ends_pick_what_the_reference_picks() {
     let reference = LinearScan(boxes.clone());
     for row in Boxes::BACK_ENDS {
         let back_end = (row.build)(&boxes, Kernel::best());
-        let (mut hits, mut truth) = (Vec::new(), Vec::new());
         let mut met = 0;
         for _ in 0..300 {
             let ray = Ray {
@@ -29,11 +28,6 @@ fn back_ends_pick_what_the_reference_picks() {
             let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
             assert_eq!(found, wanted, "{} {ray:?}", row.name);
             met += usize::from(wanted.is_some());
-            hits.clear();
-            truth.clear();
-            back_end.nearest(&ray, 4, &mut hits);
-            reference.nearest(&ray, 4, &mut truth);
-            assert_eq!(hits, truth, "{} {ray:?}", row.name);
         }
         assert!(met > 100, "the premise: {met}");
     }
@@ -52,8 +46,7 @@ fn back_ends_pick_the_triangles_that_the_reference_picks() {
     let (_, reference) = &built[0];
     assert_eq!(built[0].0.name, "linear");
     let mut rng = SeededRng::new(6);
-    let (mut hits, mut truth) = (Vec::new(), Vec::new());
-    let (mut met, mut several) = (0, 0);
+    let mut met = 0;
     for _ in 0..300 {
         let target = &scene.items[rng.below(scene.items.len())];
         let target = scene.origin + target.centre().as_dvec3() + rng.normal3();
@@ -65,17 +58,11 @@ fn back_ends_pick_the_triangles_that_the_reference_picks() {
             far: 500.0,
         };
         let wanted = reference.first(&ray);
-        truth.clear();
-        reference.nearest(&ray, 4, &mut truth);
         met += usize::from(wanted.is_some());
-        several += usize::from(truth.len() > 1);
         for (row, back_end) in &built {
             let found = back_end.first(&ray);
             assert_eq!(found, wanted, "{} {ray:?}", row.name);
-            hits.clear();
-            back_end.nearest(&ray, 4, &mut hits);
-            assert_eq!(hits, truth, "{} {ray:?}", row.name);
         }
     }
-    assert!(met > 50 && several > 20, "the premise: {met} {several}");
+    assert!(met > 50, "the premise: {met}");
 }

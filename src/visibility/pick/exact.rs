@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::Pick;
+use super::{Pick, PickTruth};
 use crate::query::ItemId;
 use crate::visibility::Ray;
 use crate::visibility::truth::{Bodies, Body, BodyIndex, RayProbe, Visit};
@@ -59,30 +59,6 @@ impl<B: Body> Visit<B> for NearestHit<B> {
     }
 }
 
-/// Appends the first `count` items of the meetings.
-///
-/// Includes all items at the depth of the last of them.
-pub(super) fn nearest<B: Body>(
-    probe: &B::Probe,
-    mut hits: Vec<ItemHit<B>>,
-    count: usize,
-    out: &mut Vec<ItemId>,
-) {
-    if !B::IS_BOX {
-        hits.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.compare(&a.1, &b.1)));
-        hits.dedup_by_key(|(item, _)| *item);
-    }
-    hits.sort_unstable_by(|a, b| order::<B>(probe, a, b));
-    match count.checked_sub(1).map(|last| hits.get(last)) {
-        None => hits.clear(),
-        Some(None) => {}
-        Some(Some(&(_, last))) => {
-            hits.truncate(hits.partition_point(|(_, at)| probe.compare(at, &last).is_le()));
-        }
-    }
-    out.extend(hits.into_iter().map(|(item, _)| item));
-}
-
 /// Reference of picking, over the same tree as the sample truth.
 impl<B: Body> Pick for BodyIndex<B> {
     fn first(&self, ray: &Ray) -> Option<ItemId> {
@@ -92,11 +68,12 @@ impl<B: Body> Pick for BodyIndex<B> {
             .copied()
             .filter(|&item| (item as usize) < self.items)
     }
+}
 
-    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
-        let mut hits = self.all_hits(ray);
-        hits.retain(|(item, _)| (*item as usize) < self.items);
-        nearest::<B>(&self.probe(ray), hits, count, out);
+impl<B: Body> PickTruth for BodyIndex<B> {
+    fn met(&self, ray: &Ray) -> Vec<ItemId> {
+        let items = self.all_hits(ray).into_iter().map(|(item, _)| item);
+        items.filter(|&item| (item as usize) < self.items).collect()
     }
 }
 
@@ -112,14 +89,5 @@ impl<B: Body> Pick for LinearScan<B> {
             first.visit(body);
         }
         first.item(self.0.items)
-    }
-
-    /// O(n + k log k) for the k bodies that the ray meets.
-    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>) {
-        let probe = B::probe(ray, self.0.origin);
-        let counted = |body: &&B| (body.item() as usize) < self.0.items;
-        let hits = self.0.all.iter().filter(counted);
-        let hits = hits.filter_map(|body| Some((body.item(), body.hit(&probe, ray.far)?)));
-        nearest::<B>(&probe, hits.collect(), count, out);
     }
 }

@@ -1,7 +1,6 @@
 //! Picking: selection under the cursor. One file per back end.
 //!
-//! Queries are the first item that a ray meets, the nearest few, and everything in the cursor's
-//! frustum.
+//! Queries are the first item that a ray meets, and everything in the cursor's frustum.
 
 mod exact;
 mod wide_ray;
@@ -39,12 +38,12 @@ impl<B: Body> Bodies<B> {
 pub trait Pick: Send + Sync {
     /// First item that the ray meets; the lowest id of several at the same depth.
     fn first(&self, ray: &Ray) -> Option<ItemId>;
+}
 
-    /// Appends the `count` items that the ray meets first.
-    ///
-    /// Ordered by depth, then by id. Includes all items at the depth of the last of them, so there
-    /// may be more.
-    fn nearest(&self, ray: &Ray, count: usize, out: &mut Vec<ItemId>);
+/// Exact answers along rays, with which back ends are compared.
+pub trait PickTruth: Pick {
+    /// Items that the ray meets, in any order; an item may appear several times.
+    fn met(&self, ray: &Ray) -> Vec<ItemId>;
 }
 
 /// Row of the table of back ends; builds one for an instruction set.

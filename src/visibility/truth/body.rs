@@ -18,8 +18,6 @@ pub trait Body: Copy + Debug + Send + Sync + 'static {
     type Probe: RayProbe<Hit = Self::Hit> + Debug;
     /// Point where a ray meets the surface of a body.
     type Hit: Copy + Debug;
-    /// `true` if an item is a single body that fills its bounding box.
-    const IS_BOX: bool;
 
     /// Prepares a ray for bodies whose local coordinates are relative to `origin`.
     fn probe(ray: &Ray, origin: DVec3) -> Self::Probe;
@@ -60,7 +58,6 @@ impl SolidBox {
 impl Body for SolidBox {
     type Probe = Probe;
     type Hit = <Probe as RayProbe>::Hit;
-    const IS_BOX: bool = true;
 
     #[inline(always)]
     fn probe(ray: &Ray, _: DVec3) -> Probe {
@@ -113,7 +110,6 @@ impl Facet {
 impl Body for Facet {
     type Probe = TriangleProbe;
     type Hit = <TriangleProbe as RayProbe>::Hit;
-    const IS_BOX: bool = false;
 
     #[inline(always)]
     fn probe(ray: &Ray, origin: DVec3) -> TriangleProbe {

@@ -24,13 +24,6 @@ fn triangle_back_ends(facets: &Facets) -> Vec<(&'static str, Box<dyn Pick>)> {
     built.collect()
 }
 
-/// The nearest items.
-fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {
-    let mut items = Vec::new();
-    pick.nearest(ray, count, &mut items);
-    items
-}
-
 #[test]
 fn boxes_as_triangles_are_picked_as_boxes_are() {
     let scene = load("city:n=300", &Default::default()).unwrap();
@@ -46,11 +39,10 @@ fn boxes_as_triangles_are_picked_as_boxes_are() {
         let origin = min + (max - min) * rng.point();
         let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.2);
         let ray = ray(origin, direction);
-        let (first, wanted) = (reference.first(&ray), nearest(&reference, &ray, 4));
+        let first = reference.first(&ray);
         met += usize::from(first.is_some());
         for (name, pick) in &built {
             assert_eq!(pick.first(&ray), first, "{name}: {ray:?}");
-            assert_eq!(nearest(&**pick, &ray, 4), wanted, "{name}: {ray:?}");
         }
     }
     assert!(met > 400, "{met}");
@@ -70,12 +62,11 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
         let eye = scene.places[rng.below(scene.places.len())].eye;
         let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.5);
         let ray = ray(eye, direction);
-        let (first, wanted) = (truth.first(&ray), nearest(&truth, &ray, 8));
-        assert!(wanted.iter().all(|&item| (item as usize) < count));
-        hidden += usize::from(first.is_none() && !wanted.is_empty());
+        let (first, met) = (truth.first(&ray), truth.met(&ray));
+        assert!(met.iter().all(|&item| (item as usize) < count));
+        hidden += usize::from(first.is_none() && !met.is_empty());
         for (name, pick) in &built {
             assert_eq!(pick.first(&ray), first, "{name}: {ray:?}");
-            assert_eq!(nearest(&**pick, &ray, 8), wanted, "{name}: {ray:?}");
         }
     }
     assert!(hidden > 0, "{hidden}");
@@ -93,7 +84,7 @@ fn grid(rng: &mut SeededRng, most: usize) -> Vec3 {
 fn every_instruction_set_finds_what_testing_all_finds() {
     let mut rng = SeededRng::new(17);
     let sizes = [0.0, 1e-30, -6e-17, 0.25, -1.0, 1.0, 3000.0];
-    let (mut met, mut several) = (0, 0);
+    let mut met = 0;
     for n in [0, 1, 15, 300] {
         let mut facet = |i: usize| {
             let at = grid(&mut rng, 12);
@@ -128,16 +119,10 @@ fn every_instruction_set_finds_what_testing_all_finds() {
             }
             let first = linear.first(&ray);
             met += usize::from(first.is_some());
-            for count in [0, 1, 3, 9] {
-                let wanted = nearest(&linear, &ray, count);
-                several += usize::from(wanted.len() > 1);
-                for (kernel, wide) in &wide {
-                    let found = nearest(wide, &ray, count);
-                    assert_eq!(found, wanted, "{kernel} {count} {ray:?}");
-                    assert_eq!(wide.first(&ray), first, "{kernel} {ray:?}");
-                }
+            for (kernel, wide) in &wide {
+                assert_eq!(wide.first(&ray), first, "{kernel} {ray:?}");
             }
         }
     }
-    assert!(met > 300 && several > 300, "the premise: {met} {several}");
+    assert!(met > 300, "the premise: {met}");
 }
