@@ -67,7 +67,7 @@ fn missed(camera: Camera) -> [bool; 4] {
 
     let subject = Subject::build(structures[0].clone(), false, &scene, culling.test);
     let mut checks = super::verify::check(&workload, &[subject], "", "");
-    judge_camera_level(&workload, &mut checks, "");
+    judge_camera_level(&workload, &mut checks, "", "");
     let by_verify = checks.iter().any(|check| check.difference.is_some());
 
     let setting = Setting {

@@ -134,8 +134,8 @@ fn check_path(
             _ => over_boxes,
         };
         let mut checked = check(&workload, subjects, &kind, again);
+        judge_camera_level(&workload, &mut checked, &kind, again);
         if rows.is_empty() {
-            judge_camera_level(&workload, &mut checked, again);
             rows = checked;
             continue;
         }
@@ -207,7 +207,7 @@ fn workloads<'a>(
 ///
 /// All structures that agreed share these answers. Includes points on the cameras' faces if the
 /// planes are safe.
-pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
+pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], kind: &str, again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
     let (missed, or_points) = match workload.culling.unproven().is_none() {
         true => {
@@ -223,7 +223,7 @@ pub fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
         check.status = Status::Unsafe;
         check.difference = Some(format!(
-            "camera level: missed {}{or_points} and {}, the deepest by {}\n  again: {again}",
+            "{kind} volume, camera level: missed {}{or_points} and {}, the deepest by {}\n  again: {again}",
             text::counted(errors.false_negatives as usize, "visible item"),
             text::counted(errors.touch_dropped as usize, "boundary contact"),
             text::significant(errors.worst_miss)
