@@ -61,7 +61,7 @@ fn city_grid(scene: &Scene) -> Option<CityGrid> {
 impl World {
     pub(super) fn new(scene: &Scene, step: f64, seed: u64) -> World {
         let (low, high) = (scene.bounds.min.as_dvec3(), scene.bounds.max.as_dvec3());
-        let edges = scene.items.iter().map(longest);
+        let edges = scene.items.iter().map(|b| edges(b).max_element());
         let mean = edges.sum::<f64>() / scene.items.len().max(1) as f64;
         let sizes = [mean, (high - low).length() / 1000.0, 1.0];
         World {
@@ -91,7 +91,7 @@ impl World {
 
     /// Step length of an item, proportional to its size.
     fn step(&self, b: &Aabb) -> f64 {
-        let own = longest(b);
+        let own = edges(b).max_element();
         self.step * if own > 0.0 { own } else { self.mean }
     }
 
@@ -117,8 +117,14 @@ impl World {
     }
 }
 
-fn longest(b: &Aabb) -> f64 {
-    (b.max.as_dvec3() - b.min.as_dvec3()).max_element()
+/// Edges of a box; zero where they are no longer than outward rounding makes them.
+fn edges(b: &Aabb) -> DVec3 {
+    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+    let (size, rounding) = (
+        max - min,
+        min.abs().max(max.abs()) * f64::from(f32::EPSILON) * 2.0,
+    );
+    DVec3::select(size.cmpgt(rounding), size, DVec3::ZERO)
 }
 
 /// A coordinate reflected between two mirrors; the middle if there is no room.
@@ -165,7 +171,7 @@ pub(super) fn swarm(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
 
 pub(super) fn doors(world: &World, id: ItemId, moves: u32) -> Option<Aabb> {
     let b = &world.start[id as usize];
-    let size = world.up.to_z_up(b.max.as_dvec3() - b.min.as_dvec3());
+    let size = world.up.to_z_up(edges(b));
     let (axis, width) = match size.x >= size.y {
         true => (DVec3::X, size.x),
         false => (DVec3::Y, size.y),

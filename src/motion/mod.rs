@@ -166,20 +166,28 @@ impl Motion {
         let complete = (path.times.len() / views).max(1);
         let (paced, late) = recorded.at(path.times.iter().step_by(views).take(complete));
         let (count, spare) = (path.times.len(), path.times.len() % views);
-        if spare > 0 {
-            let all = counted(count, "camera");
-            let fate = ["are not used", "take turns"][usize::from(count < views)];
+        let all = counted(count, "camera");
+        if count < views {
+            note(&format!(
+                "{name}: the {all} of '{path_name}' take turns in a frame of {views} views"
+            ));
+        } else if spare > 0 {
             note(&format!(
                 "{name}: the last {spare} of {all} of '{path_name}' fill no frame of {views} views and \
-                 {fate}"
+                 are not used"
             ));
         }
-        if late > 0 {
-            let of = format!("{late} of {} moves", recorded.moves());
-            let fate = ["are not used", "only widen the margin of the planes"];
-            let fate = fate[usize::from(paced.is_widened())];
-            let what = format_args!("come after the last frame of '{path_name}' and {fate}");
-            note(&format!("{name}: {of} {what}"));
+        let fate = ["are not used", "only widen the margin of the planes"];
+        let after = ["after the last", fate[usize::from(paced.is_widened())]];
+        let before = ["before the first", "happen in it, all at once"];
+        let early = recorded.moves_before(path.times[0]);
+        for (count, [when, fate]) in [(early, before), (late, after)] {
+            if count > 0 {
+                let of = format!("{count} of {} moves", recorded.moves());
+                note(&format!(
+                    "{name}: {of} come {when} frame of '{path_name}' and {fate}"
+                ));
+            }
         }
         Motion {
             frames: paced.frames(),
@@ -188,7 +196,7 @@ impl Motion {
         }
     }
 
-    /// Warns or notes if frames and cameras without times differ in number.
+    /// Warns or notes if frames and cameras differ in number and are not paired by their times.
     pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
         let views = views.max(1);
@@ -204,16 +212,17 @@ impl Motion {
         }
         let is_recorded = self.recorded().is_some();
         let frames = format!("{name}: its frames have {}", counted(seen, "view"));
+        let all = counted(cameras, "camera");
         if is_recorded && path.times.is_empty() && ![0, seen].contains(&lines) {
-            let cameras = counted(cameras, "camera");
             crate::input::warn(&format!(
-                "{frames}, but '{path_name}' has {cameras} and not a time for each: they are \
-                 paired by their numbers"
+                "{frames}, but '{path_name}' has {all} and not a time for each: they are paired \
+                 by their numbers"
             ));
-        } else if !is_recorded && seen < cameras {
-            let all = counted(cameras, "camera");
+        } else if (!is_recorded || path.times.is_empty()) && seen < cameras {
             let what = format_args!("the last {} of {all} of '{path_name}'", cameras - seen);
             note(&format!("{frames}: {what} are not used"));
+        } else if is_recorded && path.times.is_empty() && seen > cameras {
+            note(&format!("{frames}: the {all} of '{path_name}' take turns"));
         }
     }
 

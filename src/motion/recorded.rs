@@ -53,6 +53,12 @@ impl Recorded {
         (&self.ids[rows.clone()], &self.rows[rows])
     }
 
+    /// Number of rows before a time.
+    pub(super) fn moves_before(&self, time: f64) -> usize {
+        let frames = self.times.partition_point(|own| *own < time);
+        self.ends[..frames].last().copied().unwrap_or_default()
+    }
+
     /// A frame for each time, with all rows since the previous one.
     ///
     /// The last row of an item counts. Returns the number of unused rows, too.

@@ -185,7 +185,10 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     }
     let times = even_times(animation.seconds, stage.count);
     let pose = |time: f64| match animation.at(time) {
-        Some(place) => Ok(pose(stage, &place)),
+        Some(place) => Ok(Pose {
+            time_s: Some(time),
+            ..pose(stage, &place)
+        }),
         None => Err(unfit(format!(
             "no direction of view at {time} s; expected a transform with one"
         ))),

@@ -37,7 +37,7 @@ pub struct CameraPath {
     pub cameras: Vec<Camera>,
     /// Line of each camera in its file; empty for a spec.
     pub lines: Vec<u64>,
-    /// Times of all cameras of the file in seconds, ascending; empty if one is missing.
+    /// Times of all cameras in seconds, ascending; empty if one has none.
     pub times: Vec<f64>,
     /// Scale of far that `visible=` has found.
     pub lens_scale: Option<f64>,
@@ -194,6 +194,8 @@ pub(crate) struct Pose {
     forward: DVec3,
     magnification: f64,
     view: Option<PlaceView>,
+    /// Time in the scene's animation, if it moves the camera.
+    time_s: Option<f64>,
 }
 
 impl Pose {
@@ -203,6 +205,7 @@ impl Pose {
             forward,
             magnification: 1.0,
             view: None,
+            time_s: None,
         }
     }
 }
@@ -313,6 +316,7 @@ fn read(
     let path = CameraPath {
         name: source.to_owned(),
         cameras,
+        times: poses.iter().filter_map(|pose| pose.time_s).collect(),
         ..CameraPath::default()
     };
     match visible {

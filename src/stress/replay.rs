@@ -124,6 +124,8 @@ impl Replay<'_> {
         let truth = oracle.as_ref().map(|oracle| results.visible_to(oracle));
         let listed = &vector.expected_visible_camera;
         let wanted = listed.clone().or(truth).unwrap_or_default();
+        let touches = vector.touch_camera.iter().flatten().next().is_some();
+        let sees_nothing = wanted.is_empty() && !touches && listed.is_some();
         let cubes = self.build_all(&CullingTest::Sphere.items(results.items));
         for (test, name, _) in TESTS {
             let structures = match test {
@@ -139,9 +141,7 @@ impl Replay<'_> {
                     Some("a view or, where sums could overflow, a refusal".into())
                 }
                 // A camera that cannot be made sees nothing.
-                (None, Err(_)) if wanted.is_empty() && listed.is_some() => {
-                    Some(Answer::of_names(&wanted))
-                }
+                (None, Err(_)) if sees_nothing => Some(Answer::of_names(&wanted)),
                 _ => None,
             };
             let (view, visible) = (view.map_err(|e| e.to_string()), Answer::of_names(&wanted));

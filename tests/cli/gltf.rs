@@ -98,7 +98,7 @@ fn notes_tell_of_what_is_not_read_as_drawn() {
         "1 item hidden by KHR_node_visibility, read all the same",
         "1 camera without a direction of view, left out",
         "1 further scene not read",
-        "1 node with a mesh outside of the scene, not read",
+        "1 node with a mesh or a camera outside of the scene, not read",
         "extensions that it requires, not read: EXT_odd",
     ];
     assert_eq!(done.code, Some(0), "{}", done.err);

@@ -153,7 +153,7 @@ fn times_and_cameras_that_are_not_used_are_said() {
     for (path, wanted) in [
         (
             "one",
-            "the last 1 of 1 camera of 'one.csv' fill no frame of 2 views and take turns",
+            "the 1 camera of 'one.csv' take turns in a frame of 2 views",
         ),
         (
             "all",

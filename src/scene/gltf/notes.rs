@@ -70,8 +70,8 @@ impl File<'_> {
         };
         let items = |is: &dyn Fn(&Placed) -> bool| placed.iter().filter(|item| is(item)).count();
         let read = |is: &dyn Fn(usize) -> bool| order.iter().filter(|(node, _)| is(*node)).count();
-        let has_mesh = |node: usize| nodes[node].mesh.is_some();
-        let meshes = (0..nodes.len()).filter(|node| has_mesh(*node)).count();
+        let is_used = |node: usize| nodes[node].mesh.is_some() || nodes[node].camera.is_some();
+        let used = (0..nodes.len()).filter(|node| is_used(*node)).count();
         note_counted(self.name, [
             (items(&|i| nodes[i.node].skin.is_some()), "item", "with a skin, placed by its node and not by joints"),
             (items(&is_morphed), "item", "with morph weights, as stored and not morphed"),
@@ -79,7 +79,7 @@ impl File<'_> {
             (items(&|i| hidden[i.node]), "item", "hidden by KHR_node_visibility, read all the same"),
             (read(&|n| nodes[n].camera.is_some()) - cameras, "camera", "without a direction of view, left out"),
             (root.scenes.len().saturating_sub(1), "further scene", "not read"),
-            (meshes - read(&has_mesh), "node", "with a mesh outside of the scene, not read"),
+            (used - read(&is_used), "node", "with a mesh or a camera outside of the scene, not read"),
         ]);
         if root.extensions_used.iter().any(|name| name == "KHR_animation_pointer") {
             let what = "KHR_animation_pointer is not read: what it moves stays as it is stored";
