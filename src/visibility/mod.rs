@@ -19,7 +19,7 @@ pub mod truth;
 use serde::Serialize;
 
 pub use map_selection::MapSelection;
-pub use rays::{Ray, Rays, SampleGrid};
+pub use rays::{Ray, RayProbe, Rays, SampleGrid};
 pub use region::doom::surfaces_of;
 pub use solids::Solids;
 

@@ -8,9 +8,8 @@ use super::canvas::{Canvas, Rectangle, Stencil};
 use super::cut_outs::AlphaMasks;
 use crate::query::{ItemId, distinct};
 use crate::scene::{Surfaces, WorldBox};
-use crate::visibility::truth::{
-    Body, BoxHit, Facet, Probe, RayProbe, SolidBox, TriangleHit, TriangleProbe,
-};
+use crate::visibility::RayProbe;
+use crate::visibility::truth::{Body, BoxHit, Facet, Probe, SolidBox, TriangleHit, TriangleProbe};
 
 /// Fragment tests in addition to the z-test.
 #[derive(Clone, Copy, Default, Debug)]

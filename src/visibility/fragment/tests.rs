@@ -8,10 +8,8 @@ use super::*;
 use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
-use crate::visibility::truth::{
-    Boxes, NO_ITEM, RayIndex, RayProbe, SampleTruth, SolidBox, fronts, judge,
-};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::truth::{Boxes, NO_ITEM, RayIndex, SampleTruth, SolidBox, fronts, judge};
+use crate::visibility::{RayProbe, Rays, SampleGrid, Solids};
 
 impl Canvas {
     /// Canvas of a camera, for boxes.

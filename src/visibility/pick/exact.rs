@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use super::{Pick, PickTruth};
 use crate::query::ItemId;
-use crate::visibility::Ray;
-use crate::visibility::truth::{Bodies, Body, BodyIndex, RayProbe, Visit};
+use crate::visibility::truth::{Bodies, Body, BodyIndex, Visit};
+use crate::visibility::{Ray, RayProbe};
 
 /// An item and the point where a ray meets it.
 type ItemHit<B> = (ItemId, <B as Body>::Hit);

@@ -4,13 +4,12 @@ use std::fmt::Debug;
 
 use glam::{DVec3, Vec3};
 
-use super::super::rays::RayProbe;
 use super::ray_box::Probe;
 use super::ray_triangle::TriangleProbe;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, WorldBox};
-use crate::visibility::{Ray, Solids};
+use crate::visibility::{Ray, RayProbe, Solids};
 
 /// A body that rays meet.
 pub trait Body: Copy + Debug + Send + Sync + 'static {

@@ -17,7 +17,6 @@ use crate::query::ItemId;
 use crate::threads;
 use crate::visibility::{Rays, SampleGrid};
 
-pub use super::rays::RayProbe;
 pub use body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 pub use ray_box::{BoxHit, Probe};
 pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex, Visit};

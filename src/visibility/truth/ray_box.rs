@@ -2,11 +2,10 @@
 
 use std::cmp::Ordering;
 
-use super::super::rays::RayProbe;
 use crate::arithmetic::Expansion;
 use crate::kernel::each;
 use crate::scene::WorldBox;
-use crate::visibility::Ray;
+use crate::visibility::{Ray, RayProbe};
 
 /// Bound of the relative error of a rounded depth.
 ///

@@ -2,14 +2,13 @@
 
 use std::cmp::Ordering;
 
-use super::super::rays::RayProbe;
 use super::body::{Bodies, Body, Boxes, Facet, Facets, SolidBox};
 use super::ray_tree::{RayTree, misses};
 use super::slabs::{RaySlabTest, round_up};
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::ItemId;
 use crate::scene::Surfaces;
-use crate::visibility::{Ray, Rays, SampleGrid, Solids};
+use crate::visibility::{Ray, RayProbe, Rays, SampleGrid, Solids};
 
 /// A body padded to cache lines.
 #[derive(Clone, Copy, Debug)]

@@ -8,12 +8,11 @@ use std::cmp::Ordering;
 
 use glam::{DVec3, I64Vec3, Vec3};
 
-use super::super::rays::RayProbe;
 use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
-use crate::visibility::Ray;
 use crate::visibility::triangle::exact_normal;
+use crate::visibility::{Ray, RayProbe};
 
 /// Unit of the error bounds, u = 2^-53.
 ///

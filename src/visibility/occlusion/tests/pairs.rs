@@ -11,8 +11,8 @@ use super::{case_count, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
-use crate::visibility::truth::{Probe, RayProbe};
-use crate::visibility::{Ray, SampleGrid};
+use crate::visibility::truth::Probe;
+use crate::visibility::{Ray, RayProbe, SampleGrid};
 
 const GRID: SampleGrid = SampleGrid::new(64, 40);
 /// Slope of a pixel of an image with a vertical field of view of 90 degrees.
