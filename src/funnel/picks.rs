@@ -207,7 +207,7 @@ impl<'w> Picks<'w> {
             ids.map(|(id, _)| id).collect()
         });
         CursorTruth {
-            first: Vec::from_iter(exact.first(&cursor.ray)),
+            first: exact.first(&cursor.ray),
             met: met_within(exact, rays, &cursor.rectangle),
             in_planes,
         }
@@ -217,11 +217,7 @@ impl<'w> Picks<'w> {
 /// Cursors at the cell centres of a grid over the image.
 fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor> {
     let size = [image.width, image.height].map(f64::from);
-    let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
-    let rows = 0..CURSORS.height;
-    let cells = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
-    let cursor = |(column, row): (u32, u32)| {
-        let (x, y) = (part(column, CURSORS.width), part(row, CURSORS.height));
+    let cursor = |[x, y]: [f64; 2]| {
         let rectangle = CursorRectangle::around([x * size[0], y * size[1]], REACH, size);
         Cursor {
             ray: rays.through(x, y),
@@ -229,12 +225,12 @@ fn cursors(rays: &Rays, image: SampleGrid, around: &Surroundings) -> Vec<Cursor>
             volume: rectangle.volume(rays, around).ok(),
         }
     };
-    cells.map(cursor).collect()
+    CURSORS.centres().map(cursor).collect()
 }
 
 /// Exact answers at a cursor.
 struct CursorTruth {
-    first: Vec<ItemId>,
+    first: Option<ItemId>,
     /// Items met by sample rays through the rectangle, ascending: a lower bound.
     met: Vec<ItemId>,
     /// Items that no plane of the rectangle's frustum excludes, ascending.
@@ -247,7 +243,7 @@ impl CursorTruth {
     /// Returns `true` if an answer is exact; sorts an answer that is a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
-            PickQuestion::First => *answer == self.first[..],
+            PickQuestion::First => *answer == *self.first.as_slice(),
             PickQuestion::Through => {
                 answer.sort_unstable();
                 let has = |item: &ItemId| answer.binary_search(item).is_ok();
@@ -279,7 +275,7 @@ mod tests {
     #[test]
     fn answers_are_held_against_the_exact_ones() {
         let truth = CursorTruth {
-            first: vec![4],
+            first: Some(4),
             met: vec![2, 4],
             in_planes: Some(vec![2, 4, 9]),
         };

@@ -29,6 +29,20 @@ impl SampleGrid {
     pub fn samples(self) -> usize {
         self.width as usize * self.height as usize
     }
+
+    /// Centre of a pixel: column from the left, row from the top.
+    ///
+    /// (0, 0) is the upper left corner of the image, (1, 1) the lower right one.
+    fn centre(self, column: u32, row: u32) -> [f64; 2] {
+        let at = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count);
+        [at(column, self.width), at(row, self.height)]
+    }
+
+    /// Centres of all pixels, row by row.
+    pub fn centres(self) -> impl Iterator<Item = [f64; 2]> {
+        let rows = 0..self.height;
+        rows.flat_map(move |row| (0..self.width).map(move |column| self.centre(column, row)))
+    }
 }
 
 /// Half-line `origin + t * direction`; `t` is the depth.
@@ -75,13 +89,19 @@ impl Rays {
         Ok(Rays { camera, window })
     }
 
+    /// Place in the window of a point of the image, to the right and up.
+    ///
+    /// (0, 0) is the upper left corner, (1, 1) the lower right one.
+    pub fn in_window(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [left, right, bottom, top] = self.window;
+        [left + (right - left) * x, top + (bottom - top) * y]
+    }
+
     /// The ray through a point of the image.
     ///
     /// (0, 0) is the upper left corner, (1, 1) the lower right one.
     pub fn through(&self, x: f64, y: f64) -> Ray {
-        let [left, right, bottom, top] = self.window;
-        let across = left + (right - left) * x;
-        let up = top + (bottom - top) * y;
+        let [across, up] = self.in_window([x, y]);
         let frame = &self.camera.frame;
         let aside = frame.u() * across + frame.v() * up;
         let lens = &self.camera.lens;
@@ -105,15 +125,13 @@ impl Rays {
 
     /// Rays of all samples, row by row.
     pub fn of_grid(&self, grid: SampleGrid) -> impl Iterator<Item = Ray> {
-        let rows = 0..grid.height;
-        let pixels = rows.flat_map(move |row| (0..grid.width).map(move |column| (column, row)));
-        pixels.map(move |(column, row)| self.sample(grid, column, row))
+        grid.centres().map(|[x, y]| self.through(x, y))
     }
 
     /// Ray through a pixel's centre: column from the left, row from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {
-        let at = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count);
-        self.through(at(column, grid.width), at(row, grid.height))
+        let [x, y] = grid.centre(column, row);
+        self.through(x, y)
     }
 }
 

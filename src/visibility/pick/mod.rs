@@ -79,23 +79,21 @@ impl CursorRectangle {
     /// [`Camera::volume`].
     pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
         let camera = &rays.camera;
-        let [left, right, bottom, top] = rays.window;
-        let across = |x: f64| left + (right - left) * x;
-        let up = |y: f64| top + (bottom - top) * y;
-        let ([left, top], [right, bottom]) = (self.min, self.max);
-        let window = [across(left), across(right), up(bottom), up(top)];
+        let [[left, top], [right, bottom]] = [self.min, self.max].map(|p| rays.in_window(p));
         let (near, far) = (camera.lens.near(), camera.lens.far());
         let mut frame = camera.frame;
         let lens = match camera.lens.is_orthographic() {
             true => {
-                let [left, right, bottom, top] = window;
                 let (middle, middle_up) = ((left + right) / 2.0, (bottom + top) / 2.0);
                 frame.eye += frame.u() * middle + frame.v() * middle_up;
                 let (width, height) = (right - left, top - bottom);
                 let far = far.unwrap_or(f64::INFINITY);
                 Lens::orthographic(height, width / height, near, far)?
             }
-            false => Lens::off_axis(window.map(|slope| slope * near), near, far)?,
+            false => {
+                let window = [left, right, bottom, top].map(|slope| slope * near);
+                Lens::off_axis(window, near, far)?
+            }
         };
         Camera { frame, lens }.volume(&PlaneOptions::default(), around)
     }
