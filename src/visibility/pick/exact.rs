@@ -1,7 +1,5 @@
 //! Exact choice among candidates, and the reference that tests every body.
 
-use std::cmp::Ordering;
-
 use super::{Pick, PickTruth};
 use crate::query::ItemId;
 use crate::visibility::truth::{Bodies, Body, BodyIndex, Visit};
@@ -9,12 +7,6 @@ use crate::visibility::{Ray, RayProbe};
 
 /// An item and the point where a ray meets it.
 type ItemHit<B> = (ItemId, <B as Body>::Hit);
-
-/// Exact order by depth, then by id.
-#[inline]
-fn order<B: Body>(probe: &B::Probe, a: &ItemHit<B>, b: &ItemHit<B>) -> Ordering {
-    probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
-}
 
 /// Nearest candidate so far that a ray meets.
 pub(super) struct NearestHit<B: Body> {
@@ -38,9 +30,8 @@ impl<B: Body> NearestHit<B> {
     /// Nearest item, if its id is below `items`.
     #[inline]
     pub fn item(&self, items: usize) -> Option<ItemId> {
-        self.best
-            .map(|hit| hit.0)
-            .filter(|&item| (item as usize) < items)
+        let item = self.best.map(|hit| hit.0);
+        item.filter(|&item| (item as usize) < items)
     }
 }
 
@@ -48,10 +39,10 @@ impl<B: Body> Visit<B> for NearestHit<B> {
     #[inline(always)]
     fn visit(&mut self, body: &B) -> f64 {
         if let Some(at) = body.hit(&self.probe, self.limit) {
-            let hit = (body.item(), at);
-            let is_first = |best: ItemHit<B>| order::<B>(&self.probe, &hit, &best).is_lt();
-            if self.best.is_none_or(is_first) {
-                self.best = Some(hit);
+            let item = body.item();
+            let order = |best: ItemHit<B>| self.probe.compare(&at, &best.1).then(item.cmp(&best.0));
+            if self.best.is_none_or(|best| order(best).is_lt()) {
+                self.best = Some((item, at));
                 self.limit = self.limit.min(B::Probe::max_depth(&at));
             }
         }
@@ -63,10 +54,8 @@ impl<B: Body> Visit<B> for NearestHit<B> {
 impl<B: Body> Pick for BodyIndex<B> {
     fn first(&self, ray: &Ray) -> Option<ItemId> {
         let front = self.front_of(ray).front;
-        front
-            .first()
-            .copied()
-            .filter(|&item| (item as usize) < self.items)
+        let item = front.first().copied();
+        item.filter(|&item| (item as usize) < self.items)
     }
 }
 
