@@ -129,10 +129,9 @@ impl<B: Drawable> Drawn<B> {
                     self.counts.clear_count += 1;
                     return;
                 }
-                let is_before = |(front, _): (B::Hit, _)| probe.compare(&at, &front).is_le();
                 let passes = match body.hides() {
                     true => self.test(probe, Fragment { sample, item, at }),
-                    false => self.front[sample].is_none_or(is_before),
+                    false => self.has_nothing_before(&at, sample, probe),
                 };
                 self.counts.shaded_count += u64::from(passes);
                 if passes && !body.hides() && self.before.last() != Some(&item) {
@@ -143,6 +142,12 @@ impl<B: Drawable> Drawn<B> {
             self.counts.kept_out_count += kept_out;
         }
         self.counts.covered_count = self.front.iter().flatten().count() as u64;
+    }
+
+    /// Returns `true` if nothing drawn at a sample is nearer than a point.
+    #[inline]
+    fn has_nothing_before(&self, at: &B::Hit, sample: usize, probe: &B::Probe) -> bool {
+        self.front[sample].is_none_or(|(front, _)| probe.compare(at, &front).is_le())
     }
 
     /// Applies the z-test; writes the fragment and returns true if it passes.
@@ -205,12 +210,9 @@ impl Drawn {
         for rectangle in rectangles {
             let area = canvas.screen.rectangle(rectangle);
             let [asked, _] = canvas.scan(area, None, |sample, probe| {
-                let is_before = |at| {
-                    let before = |(front, _): (_, _)| probe.compare(&at, &front).is_le();
-                    self.front[sample].is_none_or(before)
-                };
                 let entered = probe.enter(rectangle, f64::INFINITY);
-                marked[sample] |= entered.is_some_and(is_before);
+                let is_seen = |at| self.has_nothing_before(&at, sample, probe);
+                marked[sample] |= entered.is_some_and(is_seen);
             });
             tested += asked;
         }
