@@ -163,7 +163,8 @@ impl BoxBlock {
             let sum = isa.add(sum, scaled(isa, margin.length, radius));
             let value = isa.add(sum, scaled(isa, margin.slope, reach));
             let is_number = isa.at_most(isa.splat(f32::MIN), value);
-            let far = values_at(isa, plane, self.corner_rows(corner));
+            let far = sums_at(isa, n, self.corner_rows(corner));
+            let far = isa.add(far, isa.splat(plane.d));
             let beyond = !isa.not_below(value, 0.0) & is_number & whole;
             kept &= isa.not_below(far, 0.0) & !beyond;
         }
@@ -230,13 +231,9 @@ fn scaled<I: Isa>(isa: I, x: f32, floats: I::Floats) -> I::Floats {
     isa.mul(isa.splat(x), floats)
 }
 
-/// [`Plane::value_at`] of sixteen corners, given as rows.
-#[inline(always)]
-fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::Floats {
-    isa.add(sums_at(isa, plane.normal, corners), isa.splat(plane.d))
-}
-
-/// The part of `value_at` that planes with the same normal share.
+/// [`Plane::value_at`] without `d` of sixteen corners, given as rows.
+///
+/// The part that planes with the same normal share.
 #[inline(always)]
 pub(super) fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
     let sum = isa.add(scaled(isa, n.x, isa.load(x)), scaled(isa, n.y, isa.load(y)));
