@@ -34,6 +34,41 @@ pub enum Pose {
 const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
 impl Pose {
+    /// The pose that the camera's frame was made from.
+    ///
+    /// After a turn or a move: the frame's current eye, direction and up.
+    pub fn of(camera: &Camera) -> Pose {
+        let frame = &camera.frame;
+        match frame.written {
+            Some(pose) if pose.eye() == frame.eye => pose,
+            _ => Pose::Forward {
+                eye: frame.eye,
+                forward: frame.forward(),
+                up: frame.v(),
+            },
+        }
+    }
+
+    /// The frame of this pose.
+    ///
+    /// # Errors
+    /// The errors of [`look_at`] and [`Frame::looking_along`].
+    pub fn frame(&self) -> Result<Frame> {
+        let [u, n] = self.axes()?;
+        let mut frame = Frame {
+            eye: self.eye(),
+            u,
+            v: n.cross(u),
+            n,
+            rotations: 0,
+            written: None,
+        };
+        // Corrects the last digit or two of orthogonality.
+        frame.orthonormalise();
+        frame.written = Some(*self);
+        Ok(frame)
+    }
+
     /// Position of the camera in world coordinates.
     pub fn eye(&self) -> DVec3 {
         match *self {
@@ -141,43 +176,6 @@ pub struct Frame {
 /// view or its opposite.
 pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame> {
     Pose::LookAt { eye, look, up }.frame()
-}
-
-impl Pose {
-    /// The pose that the camera's frame was made from.
-    ///
-    /// After a turn or a move: the frame's current eye, direction and up.
-    pub fn of(camera: &Camera) -> Pose {
-        let frame = &camera.frame;
-        match frame.written {
-            Some(pose) if pose.eye() == frame.eye => pose,
-            _ => Pose::Forward {
-                eye: frame.eye,
-                forward: frame.forward(),
-                up: frame.v(),
-            },
-        }
-    }
-
-    /// The frame of this pose.
-    ///
-    /// # Errors
-    /// The errors of [`look_at`] and [`Frame::looking_along`].
-    pub fn frame(&self) -> Result<Frame> {
-        let [u, n] = self.axes()?;
-        let mut frame = Frame {
-            eye: self.eye(),
-            u,
-            v: n.cross(u),
-            n,
-            rotations: 0,
-            written: None,
-        };
-        // Corrects the last digit or two of orthogonality.
-        frame.orthonormalise();
-        frame.written = Some(*self);
-        Ok(frame)
-    }
 }
 
 impl Frame {

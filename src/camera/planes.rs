@@ -174,9 +174,7 @@ impl Camera {
         let planes = margin.volume(&named, &more, reach + zero.abs(), of_eye)?;
         Ok(RelativeVolume::new(eye, planes)?)
     }
-}
 
-impl Camera {
     fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         match self.lens.kind() {
             LensKind::Matrix(matrix) => matrix.planes_about(zero),
@@ -184,7 +182,7 @@ impl Camera {
         }
     }
 
-    fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes> {
+    fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<Vec<(FrustumPlane, Plane)>> {
         use ClipSpace::{D3d, OpenGl, ReversedZ};
         let (frame, lens) = (&self.frame_about(zero), &self.lens);
         let is_matrix = matches!(lens.kind(), LensKind::Matrix(_));
@@ -213,5 +211,3 @@ impl Camera {
         Ok(named.take(count).collect())
     }
 }
-
-type NamedPlanes = Vec<(FrustumPlane, Plane)>;
