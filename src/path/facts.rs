@@ -236,23 +236,14 @@ fn share_of<T>(cameras: &[T], is_one: impl Fn(&&T) -> bool) -> Option<String> {
 ///
 /// A view matrix alone sees two units of width and height.
 fn bare(cameras: &[Camera]) -> Option<String> {
-    let is_lens = |camera: &Camera| {
-        camera
-            .lens
-            .matrix()
-            .is_some_and(ViewProjection::is_lens_only)
-    };
+    let has =
+        |camera: &Camera, kind: fn(&ViewProjection) -> bool| camera.lens.matrix().is_some_and(kind);
+    let is_lens = |camera: &Camera| has(camera, ViewProjection::is_lens_only);
     if cameras.len() > 1 && cameras.iter().all(is_lens) {
         let what = "all matrices with the eye at 0 and the axes of the world, as without a view";
         return Some(format!("{what}; expected projection x view"));
     }
-    let is_view = |camera: &&Camera| {
-        camera
-            .lens
-            .matrix()
-            .is_some_and(ViewProjection::is_view_only)
-    };
-    let what = share_of(cameras, is_view)?;
+    let what = share_of(cameras, |camera| has(camera, ViewProjection::is_view_only))?;
     Some(format!(
         "{what} matrices without a lens (axes of length 1, w = 1); expected projection x view"
     ))
