@@ -70,17 +70,9 @@ impl Labels {
 
     /// Each distinct label with its number of items, most frequent first.
     pub fn histogram(&self) -> Vec<(&str, usize)> {
-        let mut counts = vec![0; self.ends.len()];
-        for &number in &self.of_item {
-            counts[number as usize] += 1;
-        }
         let mut rows: BTreeMap<&str, usize> = BTreeMap::new();
-        for (number, count) in counts
-            .into_iter()
-            .enumerate()
-            .filter(|(_, count)| *count > 0)
-        {
-            *rows.entry(self.text(number)).or_default() += count;
+        for &number in &self.of_item {
+            *rows.entry(self.text(number as usize)).or_default() += 1;
         }
         let mut rows: Vec<(&str, usize)> = rows.into_iter().collect();
         rows.sort_by_key(|(_, count)| Reverse(*count));
