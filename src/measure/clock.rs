@@ -50,9 +50,8 @@ impl Stopwatch {
     /// Starts both clocks; the CPU clock of all threads if threads share the work.
     #[inline]
     pub fn start_for(all_threads: bool) -> Self {
-        let wall = Instant::now();
         Stopwatch {
-            wall,
+            wall: Instant::now(),
             process: all_threads.then(ProcessTime::now),
             cpu: ThreadTime::now(),
         }
