@@ -91,7 +91,7 @@ impl Surfaces {
             for axis in (0..3).filter(|&axis| b.min[axis] == b.max[axis]) {
                 rounded.max[axis] = rounded.min[axis];
             }
-            all.push_box(SurfaceKind::Opaque, false, &rounded);
+            all.push_box(SurfaceKind::Opaque, &rounded);
         }
         all
     }
@@ -135,10 +135,10 @@ impl Surfaces {
         }
     }
 
-    /// Appends the twelve triangles of a scene-local box as an item.
-    pub fn push_box(&mut self, kind: SurfaceKind, two_sided: bool, item: &Aabb) {
+    /// Appends the twelve one-sided triangles of a scene-local box as an item.
+    pub fn push_box(&mut self, kind: SurfaceKind, item: &Aabb) {
         let corners: [Vec3; 8] = std::array::from_fn(|i| item.corner(i));
-        self.push(kind, two_sided, &corners, &BOX);
+        self.push(kind, false, &corners, &BOX);
     }
 
     /// Appends an item of one kind; `triangles` are indices into its own `points`.
@@ -390,7 +390,7 @@ mod tests {
         /// The box surfaces of a scene's items, in their smallest f32 boxes.
         pub fn from_boxes(scene: &Scene) -> Surfaces {
             let mut all = Surfaces::about(scene.origin);
-            let push = |b| all.push_box(SurfaceKind::Opaque, false, b);
+            let push = |b| all.push_box(SurfaceKind::Opaque, b);
             scene.items.iter().for_each(push);
             all
         }

@@ -123,7 +123,7 @@ pub fn read_ibsp(bytes: &[u8], file: &str, name: &str, options: &LoadOptions) ->
         kinds.push(label);
         match faces {
             Some((points, triangles)) => all.push(kind, false, points, triangles),
-            None => all.push_box(kind, false, bounds),
+            None => all.push_box(kind, bounds),
         }
     };
     let all_but = |other| move |_: &usize| options.items != other;

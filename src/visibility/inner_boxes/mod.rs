@@ -419,10 +419,10 @@ mod tests {
     fn a_piece_wound_inward_takes_nothing_from_the_share() {
         let mut house = Surfaces::about(DVec3::ZERO);
         let at = |x: f32| Aabb::new(Vec3::X * x, Vec3::X * x + Vec3::splat(4.0));
-        house.push_box(SurfaceKind::Opaque, false, &at(0.0));
+        house.push_box(SurfaceKind::Opaque, &at(0.0));
         let alone = inner_boxes_of(&house, 0, 8, 2);
         let (first, end) = (house.triangles.len(), house.of_item[0].end);
-        house.push_box(SurfaceKind::Opaque, false, &at(9.0));
+        house.push_box(SurfaceKind::Opaque, &at(9.0));
         house.triangles[first..]
             .iter_mut()
             .for_each(|t| t.swap(0, 1));
@@ -435,7 +435,7 @@ mod tests {
     fn a_pane_on_a_house_takes_none_of_its_boxes() {
         let mut house = Surfaces::about(DVec3::ZERO);
         let walls = Aabb::new(Vec3::ZERO, Vec3::splat(4.0));
-        house.push_box(SurfaceKind::Opaque, false, &walls);
+        house.push_box(SurfaceKind::Opaque, &walls);
         let whole = inner_boxes_of(&house, 0, 8, 1);
         assert_eq!(whole.as_ref().unwrap().volume, 64.0);
         // Adds glass copies of the first two triangles.

@@ -64,7 +64,7 @@ impl DoomMap {
             shape.push(&mut all, kind, zero);
         }
         for thing in things {
-            all.push_box(SurfaceKind::CutOut, false, thing);
+            all.push_box(SurfaceKind::CutOut, thing);
         }
         for sector in 0..self.sectors.len() as RegionId {
             let mut shape = Shape::default();

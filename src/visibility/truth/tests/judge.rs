@@ -187,7 +187,7 @@ pub fn triangles(rng: &mut SeededRng) -> Surfaces {
     for b in ties(rng, 6) {
         let (low, high) = (b.min.as_vec3(), b.max.as_vec3());
         let b = Aabb::new(low, high);
-        surfaces.push_box(SurfaceKind::Opaque, false, &b);
+        surfaces.push_box(SurfaceKind::Opaque, &b);
     }
     surfaces
 }
