@@ -71,10 +71,8 @@ impl<B: Drawable> Image<B> {
     ) -> (Vec<ItemId>, FragmentCounts) {
         let image = &mut *self.0.borrow_mut();
         let new = || {
-            (
-                Canvas::about(rays, grid, origin),
-                Drawn::new(grid.samples()),
-            )
+            let canvas = Canvas::about(rays, grid, origin);
+            (canvas, Drawn::new(grid.samples()))
         };
         let (canvas, drawn) = image.get_or_insert_with(new);
         canvas.set_camera(rays);
@@ -256,7 +254,7 @@ impl PortalPass {
         let exits = homes.iter().flat_map(|&home| &graph.exits[home as usize]);
         let portals = exits.map(|&exit| {
             let corners = graph.openings[exit as usize].corners;
-            WorldBox::union_of(corners.map(|corner| WorldBox::new(corner, corner)))
+            WorldBox::union_of(corners.map(WorldBox::at))
         });
         let of_rooms = homes.iter().flat_map(|&home| regions.items.of_region(home));
         let of_rooms: HashSet<ItemId> = of_rooms.copied().collect();

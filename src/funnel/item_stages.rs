@@ -167,9 +167,8 @@ impl<'w> ItemStages<'w> {
     /// Counts of the last of some steps in each view.
     pub fn counts(&self, before: &[Step], steps: &[Step], truth: &VisibleItems) -> Vec<ViewCounts> {
         let both = self.after(before).iter().zip(self.after(steps));
-        let counts = both
-            .zip(truth)
-            .map(|((input, output), seen)| count_items(input, output, seen));
+        let seen = both.zip(truth);
+        let counts = seen.map(|((input, output), seen)| count_items(input, output, seen));
         counts.collect()
     }
 
@@ -242,9 +241,8 @@ impl PlanView {
 
 /// Outcome of an item, from the ascending ids after each stage.
 fn outcome(item: ItemId, outputs: &[(StageKind, &[ItemId])], is_visible: bool) -> ItemOutcome {
-    let removed = outputs
-        .iter()
-        .find(|(_, set)| set.binary_search(&item).is_err());
+    let mut outputs = outputs.iter();
+    let removed = outputs.find(|(_, set)| set.binary_search(&item).is_err());
     match (removed, is_visible) {
         (Some(_), true) => ItemOutcome::Lost,
         (Some((stage, _)), false) => ItemOutcome::Removed(*stage),

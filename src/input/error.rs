@@ -72,10 +72,8 @@ fn alike(path: &Path, error: &io::Error) -> Option<String> {
     let files = fs::read_dir(Path::new(".").join(path).parent()?).ok()?;
     let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
     let (names, name) = (names.collect::<Vec<_>>(), path.file_name()?.to_str()?);
-    let others = names
-        .iter()
-        .map(String::as_str)
-        .filter(|other| *other != name);
+    let others = names.iter().map(String::as_str);
+    let others = others.filter(|other| *other != name);
     let name = nearest(name, others)?;
     Some(format!("; did you mean '{name}'?"))
 }

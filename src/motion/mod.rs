@@ -203,10 +203,8 @@ impl Motion {
         let (seen, lines) = (self.frames * views, path.lines.len());
         let mut each: Vec<usize> = path.times.chunk_by(f64::eq).map(<[f64]>::len).collect();
         each.dedup();
-        let all = each
-            .pop()
-            .filter(|n| each.is_empty() && !views.is_multiple_of(*n));
-        if let Some(each) = all.filter(|n| *n < path.times.len()) {
+        let last = each.pop().filter(|n| !views.is_multiple_of(*n));
+        if let Some(each) = last.filter(|n| each.is_empty() && *n < path.times.len()) {
             let what = format_args!("{each} cameras at each time_s and {views} to a frame");
             crate::input::warn(&format!("{path_name}: {what}; expected --views {each}"));
         }

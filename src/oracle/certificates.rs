@@ -233,9 +233,8 @@ fn keep_tightest(bounds: &mut Vec<HalfSpace>) {
     /// Far above the rounding of the two estimates that make a ratio.
     const DOUBT: f64 = 1e-12;
     let placed = |b: &HalfSpace| {
-        let (axis, n) = (0..3)
-            .map(|k| (k, b.normal[k].estimate()))
-            .find(|(_, n)| *n != 0.0)?;
+        let mut sizes = (0..3).map(|k| (k, b.normal[k].estimate()));
+        let (axis, n) = sizes.find(|(_, n)| *n != 0.0)?;
         Some((axis * 2 + usize::from(n < 0.0), b.d.estimate() / n.abs()))
     };
     let mut best = [f64::INFINITY; 6];

@@ -236,10 +236,8 @@ fn eyes<'a>(table: &TableReader, defaults: &'a LensDefaults) -> Result<CameraRea
         let far = match far.map(|column| row.text(column)) {
             Some("") => None,
             Some(text) => {
-                let far = text
-                    .parse()
-                    .ok()
-                    .filter(|far: &f64| *far > f64::NEG_INFINITY);
+                let far = text.parse::<f64>().ok();
+                let far = far.filter(|far| *far > f64::NEG_INFINITY);
                 let found = || format!("far '{}'", shortened(text, 60));
                 let comma = finite(text).err().filter(|why| why.contains("comma"));
                 let expected = comma.unwrap_or("a number above 0, inf or nothing");

@@ -109,18 +109,16 @@ impl Surfaces {
         let opaque: Vec<usize> = opaque.collect();
         let part = |sides: [bool; 2]| {
             let (mut places, mut points) = (HashMap::new(), Vec::new());
-            let own = opaque
-                .iter()
-                .filter(|&&at| sides.contains(&self.two_sided[at]));
+            let is_own = |at: &&usize| sides.contains(&self.two_sided[**at]);
+            let own = opaque.iter().filter(is_own);
             let triangles = own.map(|&at| {
                 self.corners(at as u32).map(|p| {
                     // Adding 0.0 removes negative zeros.
-                    *places
-                        .entry((p + 0.0).to_array().map(f32::to_bits))
-                        .or_insert_with(|| {
-                            points.push(p);
-                            points.len() as u32 - 1
-                        })
+                    let place = places.entry((p + 0.0).to_array().map(f32::to_bits));
+                    *place.or_insert_with(|| {
+                        points.push(p);
+                        points.len() as u32 - 1
+                    })
                 })
             });
             let triangles: Vec<[u32; 3]> = triangles.collect();
@@ -260,10 +258,9 @@ impl Surfaces {
     pub fn open_edges(&self, item: usize) -> usize {
         let triangles = self.triangles[self.range(item)].iter();
         let edges = triangles.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let mut edges: Vec<([u32; 2], bool)> = edges
-            .filter(|(a, b)| a != b)
-            .map(|(a, b)| ([a.min(b), a.max(b)], a < b))
-            .collect();
+        let edges = edges.filter(|(a, b)| a != b);
+        let edges = edges.map(|(a, b)| ([a.min(b), a.max(b)], a < b));
+        let mut edges: Vec<([u32; 2], bool)> = edges.collect();
         edges.sort_unstable();
         let is_open = |run: &&[([u32; 2], bool)]| {
             2 * run.iter().filter(|(_, upward)| *upward).count() != run.len()

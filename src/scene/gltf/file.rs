@@ -335,9 +335,8 @@ impl<'f> File<'f> {
         };
         let elements = own.chunks(stride).take(count as usize);
         let numbers = elements.flat_map(|element| element[..size].chunks_exact(kind.size()));
-        Ok(numbers
-            .map(|bytes| number(bytes, kind, is_normalised))
-            .collect())
+        let numbers = numbers.map(|bytes| number(bytes, kind, is_normalised));
+        Ok(numbers.collect())
     }
 }
 

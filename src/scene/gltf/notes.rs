@@ -39,10 +39,8 @@ impl File<'_> {
         };
         // The first mesh of each reason.
         let met: BTreeMap<&String, usize> = met.collect();
-        let met = met
-            .iter()
-            .map(|(reason, mesh)| format!("meshes[{mesh}] {reason}"));
-        let met: Vec<String> = met.collect();
+        let line = |(reason, mesh): (&String, usize)| format!("meshes[{mesh}] {reason}");
+        let met: Vec<String> = met.into_iter().map(line).collect();
         if !met.is_empty() {
             note(&format!("{}: {what}: {}", self.name, first_of(&met, 3)));
         }

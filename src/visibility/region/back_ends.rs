@@ -43,9 +43,8 @@ impl Pvs {
     pub fn of_pairs(regions: usize, sees: impl Fn(u32, u32) -> bool) -> Option<Pvs> {
         let all = 0..regions as u32;
         let row = |from| {
-            all.clone()
-                .filter(|&to| from == to || sees(from, to))
-                .collect()
+            let seen = all.clone().filter(|&to| from == to || sees(from, to));
+            seen.collect()
         };
         (regions <= MOST_REGIONS).then(|| Pvs {
             rows: all.clone().map(row).collect(),
@@ -99,11 +98,7 @@ impl RegionGraph {
         scratch: &mut Scratch,
         out: &mut Vec<RegionId>,
     ) -> bool {
-        let Scratch {
-            homes,
-            seen,
-            search,
-        } = scratch;
+        let (homes, seen) = (&mut scratch.homes, &mut scratch.seen);
         out.clear();
         if !self.homes(rays, homes) {
             out.extend(0..self.len() as u32);
@@ -116,7 +111,7 @@ impl RegionGraph {
         seen.clear(self.len());
         match pvs {
             Some(pvs) => seen.insert_all(homes.iter().flat_map(|&home| pvs.row(home))),
-            None => search.run(self, rays, homes, seen),
+            None => scratch.search.run(self, rays, homes, seen),
         }
         seen.list(out);
         true

@@ -97,10 +97,8 @@ impl Clusters {
     /// All of them if they are two-sided. Exact; one predicate per triangle.
     #[inline(never)]
     pub fn seen(&self, eye: &Eye, cluster: usize, word: u64) -> u64 {
-        let corners = |bit: u32| {
-            self.surfaces
-                .corners(self.triangles_of(cluster)[bit as usize])
-        };
+        let triangles = self.triangles_of(cluster);
+        let corners = |bit: u32| self.surfaces.corners(triangles[bit as usize]);
         let is_seen = |bit: &u32| self.is_two_sided(cluster) || faces(eye, corners(*bit));
         let seen = Bits(word).filter(is_seen);
         seen.fold(0, |word, bit| word | 1 << bit)

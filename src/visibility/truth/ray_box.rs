@@ -165,9 +165,8 @@ impl Probe {
     #[cold]
     fn latest_entry(&self, b: &WorldBox) -> Option<BoxHit> {
         let entry = |axis| self.crossing(axis, self.entered(b, axis));
-        self.crossed()
-            .map(entry)
-            .reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
+        let entries = self.crossed().map(entry);
+        entries.reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
     }
 
     /// Returns `true` if the ray leaves a slab before it enters the last one.

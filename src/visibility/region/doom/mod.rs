@@ -91,10 +91,8 @@ impl DoomMap {
         let has_length = |line: &&Linedef| line.ends[0] != line.ends[1];
         let lines: Vec<Linedef> = file.lines.iter().filter(has_length).copied().collect();
         let mut edges = vec![Vec::new(); file.sectors.len()];
-        for line in lines
-            .iter()
-            .filter(|line| line.sectors[0] != line.sectors[1])
-        {
+        let borders = |line: &&Linedef| line.sectors[0] != line.sectors[1];
+        for line in lines.iter().filter(borders) {
             let ([front, behind], [from, to]) = (line.sectors, line.ends);
             for (sector, edge) in [(front, [from, to]), (behind, [to, from])] {
                 if let Some(sector) = sector {
