@@ -183,7 +183,7 @@ fn frame_correction(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let [kept, left_out] = [with, without].map(|ask| tasks.enter(false, ask));
     // The error of a basis that is lost is infinite.
     let error = error.unwrap_or(f64::INFINITY);
-    let reason = format!("times of 500 steps; of {steps}: error {error:.1e}");
+    let reason = format!("500 steps are timed; error after {steps}: {error:.1e}");
     let finding = Finding::new(error, TOLERANCE, reason);
     let sides = TaskPair::new("500 steps of a frame", kept, left_out);
     Ok(EnteredRule::new(sides, finding))

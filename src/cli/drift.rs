@@ -104,7 +104,7 @@ fn bases(report: &DriftReport, all: bool) -> Table {
 
 /// The recommended rotation, and the method for each stiffness of each arm.
 fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
-    let base = ("camera base".to_owned(), &report.recommended_rotation);
+    let base = ("camera basis".to_owned(), &report.recommended_rotation);
     let arms = report.arm_choices.iter().map(|choice| {
         let (arm, k) = (choice.setting.arm.name(), choice.setting.stiffness);
         (format!("{arm} arm, k={k:e}"), &choice.choice)

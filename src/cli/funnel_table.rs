@@ -93,7 +93,7 @@ pub fn blocks(report: &FunnelReport, all: bool) -> Vec<Block> {
 /// Stages of the chain and the gain of each; with `all` every back end.
 fn stages(report: &FunnelReport, all: bool) -> Table {
     let mut table = Table::of(match all {
-        true => "stage | by | >in | >out | >truth | >FP | >FN | >time | >per item",
+        true => "stage | by | >in | >out | >truth | >FP | >FN | >time | >per removed",
         false => "stage | by | >in | >out | >time | >worth it from",
     });
     let level = &report.level;

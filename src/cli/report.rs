@@ -450,8 +450,8 @@ fn conclusion(reports: &[Report], ratios: &[f64], others: usize) -> String {
     let factor = if least == most { least } else { all };
     let take = ["takes", "take"][usize::from(ratios.len() > 1)];
     format!(
-        "{failed}Over {runs} {cells} {take} {factor} x as long in the last run that has times of them as in \
-         the first, by program and machine together. compare judges two runs.{others}{note}"
+        "{failed}Over {runs} {cells} {take} {factor} x as long in their last run as in their first, by \
+         program and machine together. compare judges two runs.{others}{note}"
     )
 }
 

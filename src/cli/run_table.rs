@@ -62,7 +62,7 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         }
     });
     // Sets of a coarse test are larger than the visible set.
-    let excess = comparison.of_any("excess").filter(|excess| *excess > 0.05);
+    let excess = comparison.of_any("excess").filter(|excess| *excess > 0.005);
     let culled = comparison.of_any("cull_rate");
     // All may be false positives: then there is no share of visible ones.
     let judged = comparison.judged();
@@ -87,8 +87,14 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         None => sources.map(|items| format!("false positives {items}")),
         Some(share) => {
             let sources = text::some(sources, |items| format!(" ({items})"));
-            let share = text::rate(Some(share), 1.0);
-            Some(format!("{share} % false positives{sources}"))
+            let views = judged.map(|judged| text::counted(judged.judged_queries, "checked view"));
+            Some(match (share.value == 0.0 && share.upper.is_none(), views) {
+                (true, Some(views)) => format!("no false positives in {views}"),
+                _ => format!(
+                    "{} % false positives{sources}",
+                    text::rate(Some(share), 1.0)
+                ),
+            })
         }
     };
     let asked = [&views, &cell.test, cache.unwrap_or_default()].map(str::to_owned);

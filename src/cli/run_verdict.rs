@@ -251,13 +251,15 @@ fn checked(all: &[&Comparison]) -> Option<String> {
     let timed = most(|cell| cell.times.cameras_timed);
     let judged = all.iter().filter_map(|c| c.of_any("judged_queries"));
     let who = match right {
+        1 if tried == 1 => "The structure".to_owned(),
         _ if right == tried => "All structures".to_owned(),
         _ if all.len() == 1 => format!("{right} of {tried} structures"),
         _ => format!("{} of {} cells", text::count(right), text::count(tried)),
     };
     let of_frames = all.iter().any(|c| !c.about().path.motion.is_empty());
     let asked = match views {
-        1 => "the only view".to_owned(),
+        1 if !of_frames => "the only view".to_owned(),
+        1 => "the query of the only frame".to_owned(),
         _ if of_frames => format!("all {} queries of the frames", text::count(views)),
         _ => format!("all {} views", text::count(views)),
     };

@@ -115,7 +115,7 @@ impl Machine {
         let load = self.load.filter(|load| *load > 0.5 * cores as f64)?;
         let cores = counted(cores, "core");
         Some(format!(
-            "the machine was already busy (load average {load:.1} on {cores})"
+            "the machine, of {cores}, was already busy (load average {load:.1})"
         ))
     }
 

@@ -164,9 +164,11 @@ fn a_history_has_the_times_of_all_runs_oldest_first() {
     assert_refused(&twice, "run | is named twice; expected each once", "twice");
     let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
     assert_well_formed(&page);
-    assert!(page.contains(
-        "Over 2 runs 2 cells take 1,000 x as long in the last run that has times of them"
-    ));
+    assert!(
+        page.contains(
+            "Over 2 runs 2 cells take 1,000 x as long in their last run as in their first"
+        )
+    );
     assert_eq!(page.matches("1,000 x</td>").count(), 2, "last / first");
     assert!(
         page.find("fedcba9") > page.find("class=\"tick\""),
@@ -340,7 +342,7 @@ fn studies_and_comparisons_have_pages_that_begin_with_their_conclusions() {
         ),
         (
             "drift --steps 1000 --processes 1".to_owned(),
-            "Recommended for a camera base",
+            "Recommended for a camera basis",
             "class=\"mark",
         ),
         (
