@@ -51,13 +51,10 @@ impl<'a> Case<'a> {
 
     /// Cameras of the path with their truth, evenly spread.
     pub fn truths(&self) -> Vec<(usize, Truth)> {
-        let judged = spread(
-            self.workload.scene.items.len(),
-            MAX_TRUTHS,
-            self.workload.views.len(),
-        );
+        let Workload { scene, cameras, .. } = self.workload;
+        let judged = spread(scene.items.len(), MAX_TRUTHS, self.workload.views.len());
         let truths = judged.filter_map(|camera| {
-            let truth = Truth::of_scene(&self.workload.cameras[camera], self.workload.scene)?;
+            let truth = Truth::of_scene(&cameras[camera], scene)?;
             Some((camera, truth))
         });
         truths.collect()

@@ -31,11 +31,8 @@ impl StructureChoice {
         let mut first = fastest(cells);
         first.sort_by_key(|cell| (is_shared(cell), !cell.is_scan()));
         let mut first = first.into_iter().map(|cell| cell.structure.clone());
-        StructureChoice {
-            name: first.next(),
-            ties: first.collect(),
-            rows,
-        }
+        let (name, ties) = (first.next(), first.collect());
+        StructureChoice { name, ties, rows }
     }
 
     /// Cell of the chosen structure.

@@ -190,9 +190,6 @@ fn enter(tasks: &mut TaskList, progress: &dyn Fn(&str)) -> Result<RuleTasks> {
         let none = |error: anyhow::Error| EnteredRule::new(None, Finding::none(error.to_string()));
         rules.push((rule, draft.unwrap_or_else(none)));
     }
-    Ok(RuleTasks {
-        tests: add_tests(tasks)?,
-        twin: tasks.add_base(),
-        rules,
-    })
+    let (tests, twin) = (add_tests(tasks)?, tasks.add_base());
+    Ok(RuleTasks { tests, rules, twin })
 }

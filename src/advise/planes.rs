@@ -43,10 +43,8 @@ pub fn needless_planes(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
         let left_out = tasks.index(&*case.index, fewer);
         TaskPair::new(&case.spec.label, BASE, left_out)
     });
-    Ok(EnteredRule::new(
-        sides,
-        Finding::new(share, MAX_NEEDED, reason),
-    ))
+    let finding = Finding::new(share, MAX_NEEDED, reason);
+    Ok(EnteredRule::new(sides, finding))
 }
 
 /// Removes the planes that contain the bounds.
@@ -198,18 +196,13 @@ pub fn f64_kernel(tasks: &mut TaskList) -> anyhow::Result<EnteredRule> {
     let in_f64 = Culling::new(CullingTest::SixPlane, Arithmetic::F64, planes);
     let kept = tasks.index(&*case.index, case.views_by(&in_f64)?);
     let sides = TaskPair::new(&case.spec.label, kept, BASE);
-    Ok(EnteredRule::new(
-        sides,
-        of_margin(case.margin(&case.workload.around)),
-    ))
+    let margin = case.margin(&case.workload.around);
+    Ok(EnteredRule::new(sides, of_margin(margin)))
 }
 
 fn of_margin(margin: f64) -> Finding {
-    Finding::new(
-        margin,
-        TOLERANCE,
-        format!("f32 errs by {margin:.0e} of depth"),
-    )
+    let reason = format!("f32 errs by {margin:.0e} of depth");
+    Finding::new(margin, TOLERANCE, reason)
 }
 
 /// Rule: a scene origin of its own.

@@ -120,10 +120,8 @@ impl EnteredRule {
         sides: impl Into<Option<TaskPair>>,
         conclude: impl FnOnce(&Advice, Option<&PairResult>) -> Finding + 'static,
     ) -> EnteredRule {
-        EnteredRule {
-            sides: sides.into(),
-            conclude: Box::new(conclude),
-        }
+        let (sides, conclude) = (sides.into(), Box::new(conclude));
+        EnteredRule { sides, conclude }
     }
 }
 

@@ -34,10 +34,8 @@ pub struct CheckedAnswers {
 
 impl<'c> TaskList<'c> {
     pub fn new(case: &'c Case<'c>) -> Self {
-        let mut tasks = TaskList {
-            case,
-            asks: Vec::new(),
-        };
+        let asks = Vec::new();
+        let mut tasks = TaskList { case, asks };
         tasks.add_base();
         tasks
     }
@@ -128,11 +126,8 @@ pub struct TaskPair {
 
 impl TaskPair {
     pub fn new(on: impl ToString, kept: usize, left_out: usize) -> TaskPair {
-        TaskPair {
-            on: on.to_string(),
-            kept,
-            left_out,
-        }
+        let on = on.to_string();
+        TaskPair { on, kept, left_out }
     }
 
     /// Measured check; NaN if a task has no time, after a panic.

@@ -113,13 +113,9 @@ impl TestChoice {
         };
         // Time of a query and cost with it, in motion with the rest of a frame.
         let sides = |own: &TestRow| {
-            let mut cells = taken
-                .rows
-                .iter()
-                .filter(|cell| !cell.path.motion.is_empty());
-            let frame = cells
-                .find(|cell| cell.structure == own.structure)
-                .and_then(ns);
+            let mut moving = taken.rows.iter().filter(|c| !c.path.motion.is_empty());
+            let frame = moving.find(|cell| cell.structure == own.structure);
+            let frame = frame.and_then(ns);
             let six = row(&own.structure, CullingTest::SixPlane);
             let beyond = frame.zip(six).map(|(frame, six)| frame / views - six.ns());
             [own.ns(), own.cost() + beyond.unwrap_or_default()]
@@ -191,11 +187,8 @@ fn near_the_least<'r>(rows: &'r [TestRow], times: &OverProcesses) -> Vec<&'r Tes
     };
     let is_longer = |row: &TestRow| {
         let times = times.ratio(row.task, least.task)?;
-        is_longer(of_costs(
-            times,
-            [row.ns(), row.cost()],
-            [least.ns(), least.cost()],
-        ))
+        let [own, other] = [row, least].map(|row| [row.ns(), row.cost()]);
+        is_longer(of_costs(times, own, other))
     };
     let near = sound.filter(|row| row.test == least.test || is_longer(row) != Some(true));
     let mut near: Vec<&TestRow> = near.collect();
