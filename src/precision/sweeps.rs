@@ -146,9 +146,8 @@ fn tests_of_cameras() -> Vec<Culling> {
     };
     let arithmetics = [Arithmetic::F64, Arithmetic::F32Relative].map(|a| of(a, bare.method));
     let methods = PLANE_METHODS.map(|(method, ..)| of(Arithmetic::F32, method));
-    let mut all = vec![Culling::default()];
-    all.extend(arithmetics.into_iter().chain(methods));
-    all
+    let first = [Culling::default()].into_iter();
+    first.chain(arithmetics).chain(methods).collect()
 }
 
 /// Cullings of a sweep, before any camera is evaluated.

@@ -369,10 +369,8 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
             let means = Vec::from_iter(cells.iter().map(|c| mean(&c[side])));
             let shift = median(&means).unwrap_or_default();
             let process = |process| {
-                let own = cells
-                    .iter()
-                    .zip(&means)
-                    .map(|(c, mean)| c[side][process] - mean);
+                let own = cells.iter().zip(&means);
+                let own = own.map(|(c, mean)| c[side][process] - mean);
                 Some(shift + median(&Vec::from_iter(own))?)
             };
             (0..counts[side]).filter_map(process).collect()
@@ -393,28 +391,22 @@ fn common_shifts(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Co
         cells,
     };
     let cells = whole.iter().map(|group| group.1.len()).sum();
-    let as_a_whole =
-        judged(slice::from_ref(&common), 0.0)[0].map(|found| shift(None, found, cells));
+    let of_all = judged(slice::from_ref(&common), 0.0)[0];
+    let as_a_whole = of_all.map(|found| shift(None, found, cells));
     let relative = own.iter().map(|own| {
-        let less = |side: usize| {
-            own[side]
-                .iter()
-                .zip(&common[side])
-                .map(|(own, all)| own - all)
-        };
-        [0, 1].map(|side| less(side).collect())
+        [0, 1].map(|side| {
+            let both = own[side].iter().zip(&common[side]);
+            both.map(|(own, all)| own - all).collect()
+        })
     });
     // The median of two moves with either.
     let relative = relative.filter(|_| whole.len() >= LEAST_OTHERS);
     let judged = judged(&relative.collect::<Vec<_>>(), threshold);
-    let moved = whole
-        .iter()
-        .zip(judged)
-        .filter_map(|((group, cells), found)| {
-            let found =
-                found.filter(|found| matches!(found.change, Change::Slower | Change::Faster))?;
-            Some(shift(Some(group), found, cells.len())).filter(|_| cells.len() >= LEAST_OTHERS)
-        });
+    let moved = whole.iter().zip(judged);
+    let moved = moved.filter_map(|((group, cells), found)| {
+        let found = found.filter(|f| matches!(f.change, Change::Slower | Change::Faster))?;
+        Some(shift(Some(group), found, cells.len())).filter(|_| cells.len() >= LEAST_OTHERS)
+    });
     as_a_whole.into_iter().chain(moved).collect()
 }
 
@@ -494,9 +486,7 @@ pub fn built_differently(old: &Toolchain, new: &Toolchain) -> Vec<Setting> {
 pub fn settings(old: &Report, new: &Report) -> Vec<Setting> {
     let [old, new] = [old, new].map(|report| {
         let threads = ("run", "threads", false, report.run.threads.to_string());
-        let mut all = facts(&report.machine, &report.toolchain);
-        all.push(threads);
-        all
+        [facts(&report.machine, &report.toolchain), vec![threads]].concat()
     });
     differences(old, new).collect()
 }

@@ -292,12 +292,11 @@ impl<'r> Overall<'r> {
         let base = base.or_else(|| timed().max_by(|a, b| a.1.total_cmp(&b.1)));
         let of_base = base.and_then(|(name, _)| logs(name)).unwrap_or_default();
         let less = |own: &[f64], base: &[f64]| own.iter().zip(base).map(|(a, b)| a - b).collect();
+        let wins = |c: &Comparison, name: &str| c.winners().any(|cell| cell.structure == name);
         let standing = |&structure: &&'r str| Mean {
             structure,
             speedup: base.zip(mean(structure)).map(|(base, mean)| base.1 / mean),
-            first_in: ranked()
-                .filter(|c| c.winners().any(|cell| cell.structure == structure))
-                .count(),
+            first_in: ranked().filter(|c| wins(c, structure)).count(),
             logs: match logs(structure) {
                 Some(own) if !of_base.is_empty() => less(&own, &of_base),
                 _ => mean(structure).map(f64::ln).into_iter().collect(),
@@ -306,10 +305,8 @@ impl<'r> Overall<'r> {
         let mut standings: Vec<Mean> = names.iter().map(standing).collect();
         let speed = |standing: &Mean| standing.speedup.unwrap_or(0.0);
         standings.sort_by(|a, b| speed(b).total_cmp(&speed(a)));
-        Overall {
-            base: base.map(|(name, _)| name),
-            standings,
-        }
+        let base = base.map(|(name, _)| name);
+        Overall { base, standings }
     }
 }
 

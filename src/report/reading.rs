@@ -220,21 +220,17 @@ pub fn views(folder: &Path, report: &Report) -> BTreeMap<String, Views> {
                     let first = cameras.iter().position(|camera| *camera == frame)?;
                     last = *cameras.get(first + (queries as usize).max(1) - 1)?;
                 }
-                Some(Reading {
-                    frame: (f64::from(frame) + f64::from(last)) / 2.0,
-                    queries,
-                    ns: median(ns)?,
-                })
+                let frame = (f64::from(frame) + f64::from(last)) / 2.0;
+                let ns = median(ns)?;
+                Some(Reading { frame, queries, ns })
             };
             let readings = readings.iter().filter_map(reading).collect();
             Some((label.to_owned(), readings))
         };
         let labels = kept.subjects.iter().map(|subject| subject.label.as_str());
-        let views = Views {
-            visible: known.visible.iter().map(|answer| answer.count).collect(),
-            times: labels.filter_map(own).collect(),
-        };
-        all.insert(kept.key.id(), views);
+        let visible = known.visible.iter().map(|answer| answer.count).collect();
+        let times = labels.filter_map(own).collect();
+        all.insert(kept.key.id(), Views { visible, times });
     }
     all
 }
