@@ -98,14 +98,12 @@ pub struct DriftReport {
 pub fn prepare(steps: u64) -> DriftReport {
     let period = Period::new(steps);
     let rotation = METHODS.iter().map(|method| Rotation::of(method, &period));
-    let settings = arm_study::settings();
+    let points = arm_study::settings().flat_map(|setting| setting.errors(SECONDS));
     DriftReport {
         steps,
         rotation: rotation.collect(),
         arm_methods: arm_study::stability().collect(),
-        arm_points: settings
-            .flat_map(|setting| setting.errors(SECONDS))
-            .collect(),
+        arm_points: points.collect(),
         ..DriftReport::default()
     }
 }

@@ -78,10 +78,8 @@ impl Period {
             turns.clone()
         };
         let turns = steps.clone().map(turn).collect();
-        Period {
-            exact: [turns, steps.clone().map(rotated).collect()],
-            steps,
-        }
+        let exact = [turns, steps.clone().map(rotated).collect()];
+        Period { steps, exact }
     }
 }
 

@@ -108,11 +108,8 @@ pub struct VectorPoint {
 impl VectorCamera {
     /// Position and orientation, exact.
     pub fn pose(&self) -> Pose {
-        Pose::LookAt {
-            eye: vector(self.eye),
-            look: vector(self.look),
-            up: vector(self.up),
-        }
+        let [eye, look, up] = [self.eye, self.look, self.up].map(vector);
+        Pose::LookAt { eye, look, up }
     }
 
     /// Returns `true` if the oracle represents the angles of the lens without loss.

@@ -50,10 +50,8 @@ impl Hull {
         // Only the normals' directions are needed.
         let planes = camera.convex_volume_f64(around).ok()?;
         let normals: Vec<DVec3> = planes.planes().iter().map(|p| p.normal).collect();
-        Some(Hull {
-            corners: lens.corners(&frame)?,
-            normals: normals.try_into().ok()?,
-        })
+        let (corners, normals) = (lens.corners(&frame)?, normals.try_into().ok()?);
+        Some(Hull { corners, normals })
     }
 
     fn at(&self, [s, t, w]: [f64; 3]) -> DVec3 {
@@ -392,12 +390,9 @@ impl CameraBuilder {
     /// Position and orientation, exact.
     pub fn pose(&self) -> Pose {
         let (eye, forward, up) = (self.eye, self.forward, self.up);
+        let look = eye + forward;
         match self.to_look {
-            true => Pose::LookAt {
-                eye,
-                look: eye + forward,
-                up,
-            },
+            true => Pose::LookAt { eye, look, up },
             false => Pose::Forward { eye, forward, up },
         }
     }
