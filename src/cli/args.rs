@@ -8,7 +8,7 @@ use crate::drift;
 use crate::spec::values;
 use crate::stress::extremes::DEFAULT_CASES;
 use clap::builder::ArgPredicate;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 
 use super::command_args::{CompareArgs, FunnelArgs, SceneCommand, ViewArgs};
 use super::shared_args::{
@@ -226,13 +226,20 @@ pub struct QueryArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(group(ArgGroup::new("sought").required(true)))]
 #[command(override_usage = program::named("cullbench locate [OPTIONS] --scene <SCENE> <--points|--boxes> <FILE>"))]
 pub struct LocateArgs {
     /// A scene: boxes CSV, glTF, OBJ, Doom or Quake III map, zip, built-in name or spec
     #[arg(long)]
     pub scene: String,
-    #[command(flatten)]
-    pub sought: SearchArgs,
+    /// Points CSV (x,y,z), or places: find the regions that contain each point.
+    ///
+    /// `places` are the camera places of the scene, such as the spawn points of a map
+    #[arg(long, value_name = "FILE", group = "sought")]
+    pub points: Option<PathBuf>,
+    /// Boxes CSV: find the items that overlap each box (closed bounds)
+    #[arg(long, value_name = "FILE", group = "sought")]
+    pub boxes: Option<PathBuf>,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
@@ -242,20 +249,6 @@ pub struct LocateArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
-}
-
-/// Points or boxes to search for.
-#[derive(Args, Debug)]
-#[group(required = true, multiple = false)]
-pub struct SearchArgs {
-    /// Points CSV (x,y,z), or places: find the regions that contain each point.
-    ///
-    /// `places` are the camera places of the scene, such as the spawn points of a map
-    #[arg(long, value_name = "FILE")]
-    pub points: Option<PathBuf>,
-    /// Boxes CSV: find the items that overlap each box (closed bounds)
-    #[arg(long, value_name = "FILE")]
-    pub boxes: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

@@ -90,7 +90,7 @@ pub fn frustum(
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args.options(1))?;
-    let (what, items) = match args.sought.points {
+    let (what, items) = match args.points {
         Some(_) => ("point", scene.regions.boxes(&scene.items)),
         None => ("box", &scene.items[..]),
     };
@@ -102,7 +102,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         ("region_ids", &|row| json!(shown(&scene, row))),
         ("nodes_tested", &|row| json!(row.cost.nodes_tested)),
     ];
-    let (file, other) = (args.sought.points.as_ref(), args.sought.boxes.as_ref());
+    let (file, other) = (args.points.as_ref(), args.boxes.as_ref());
     let points = file.map_or(Ok(Vec::new()), |file| points(&scene, file))?;
     let boxes = other.map_or(Ok(Vec::new()), |file| boxes(&scene, file))?;
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
