@@ -150,10 +150,8 @@ fn blocks(advice: &Advice, args: &AdviseArgs, machine: &Machine) -> Vec<Block> {
 
 /// Cells of one scene and path, fastest first.
 fn compared(rows: &[ReportCell]) -> Comparison<'_> {
-    Comparison {
-        cells: rows.iter().collect(),
-        bounds: Vec::new(),
-    }
+    let (cells, bounds) = (rows.iter().collect(), Vec::new());
+    Comparison { cells, bounds }
 }
 
 /// The recommended structure and test, in a sentence.

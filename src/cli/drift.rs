@@ -79,11 +79,9 @@ fn tables(report: &DriftReport, all: bool) -> Vec<Block> {
              and the thread CPU time per simulated second; no: even the least error of these is \
              larger."
         )),
+        Block::Table(by_stiffness(report)),
     ];
-    blocks.push(Block::Table(by_stiffness(report)));
-    if all {
-        blocks.push(Block::Table(methods(report)));
-    }
+    blocks.extend(all.then(|| Block::Table(methods(report))));
     blocks
 }
 
@@ -110,11 +108,8 @@ fn conclusions(report: &DriftReport) -> impl Iterator<Item = Block> {
         (format!("{arm} arm, k={k:e}"), &choice.choice)
     });
     [base].into_iter().chain(arms).map(|(what, choice)| {
-        let name = choice.name.as_deref().unwrap_or("nothing");
-        Block::Line(format!(
-            "Recommended for a {what}: {name}, {}.",
-            choice.reason
-        ))
+        let (name, why) = (choice.name.as_deref().unwrap_or("nothing"), &choice.reason);
+        Block::Line(format!("Recommended for a {what}: {name}, {why}."))
     })
 }
 
@@ -123,11 +118,8 @@ fn by_stiffness(report: &DriftReport) -> Table {
     let is_same = |a: &ArmPoint, b: &ArmPoint| (a.setting, a.method) == (b.setting, b.method);
     let cells = report.arm_points.chunk_by(is_same).map(|own| {
         let (arm, k) = (own[0].setting.arm.name(), own[0].setting.stiffness);
-        [
-            own[0].method.to_owned(),
-            format!("{arm}, k={k:e}"),
-            within(own),
-        ]
+        let setting = format!("{arm}, k={k:e}");
+        [own[0].method.to_owned(), setting, within(own)]
     });
     Table::grid(&format!("within {ARM_TOLERANCE:e}"), cells)
 }

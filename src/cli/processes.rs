@@ -84,11 +84,8 @@ impl Worker {
                 } else {
                     let status = self.child.wait()?;
                     let words = self.last_words.take().and_then(|words| words.join().ok());
-                    cause(
-                        status,
-                        &step,
-                        &String::from_utf8_lossy(&words.unwrap_or_default()),
-                    )
+                    let words = words.unwrap_or_default();
+                    cause(status, &step, &String::from_utf8_lossy(&words))
                 };
                 return Err(Died(structure, verdict).into());
             }

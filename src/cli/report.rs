@@ -252,18 +252,14 @@ pub fn close(
     let failed = report.cells.iter().filter(|cell| cell.status.is_failure());
     let is_wrong = failed.clone().all(|cell| cell.status == Status::Wrong);
     let cells = text::counted(report.cells.len(), "cell");
-    let failed = format!(
-        "{} {}",
-        failed.count(),
-        ["failed", "wrong"][usize::from(is_wrong)]
-    );
-    let basis = format!("{cells}{how}, {failed}; {}", text::conclusion(report));
+    let (failed, what) = (failed.count(), ["failed", "wrong"][usize::from(is_wrong)]);
+    let conclusion = text::conclusion(report);
+    let basis = format!("{cells}{how}, {failed} {what}; {conclusion}");
     let warnings = report.noise.warnings.iter().chain(&report.run.left_out);
     let warnings = warnings.map(|said| format!("warning: {said}"));
     let lines = [String::new(), basis].into_iter().chain(warnings);
-    let mut told: Vec<String> = lines
-        .map(|line| text::wrapped(&line, text::width()))
-        .collect();
+    let lines = lines.map(|line| text::wrapped(&line, text::width()));
+    let mut told: Vec<String> = lines.collect();
     told.extend(next);
     told.push(format!("report  {}", folder.join("report.html").display()));
     let others = "report.json, summary.csv, samples.csv, stream.jsonl, *.svg";

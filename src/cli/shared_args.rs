@@ -217,10 +217,8 @@ impl KernelArgs {
             text::joined(Kernel::available().map(Kernel::name))
         );
         each_once("--threads", self.threads.iter().map(ToString::to_string))?;
-        Ok(Execution {
-            kernel,
-            threads: self.threads.iter().copied().max().unwrap_or(1),
-        })
+        let threads = self.threads.iter().copied().max().unwrap_or(1);
+        Ok(Execution { kernel, threads })
     }
 }
 
@@ -354,14 +352,10 @@ impl CullingArgs {
         if let (Some(c), Arithmetic::F64) = (self.epsilon.filter(|&c| c > 0.0), self.arithmetic) {
             bail!("--epsilon is {c} with --arithmetic f64, which has none; expected 0, or f32");
         }
-        Ok(Culling {
-            test: values::choice("test", &TESTS)(test)?,
-            arithmetic: self.arithmetic,
-            planes: PlaneOptions {
-                method: self.planes,
-                epsilon: self.epsilon.unwrap_or(DEFAULT_EPSILON),
-            },
-        })
+        let (method, epsilon) = (self.planes, self.epsilon.unwrap_or(DEFAULT_EPSILON));
+        let planes = PlaneOptions { method, epsilon };
+        let test = values::choice("test", &TESTS)(test)?;
+        Ok(Culling::new(test, self.arithmetic, planes))
     }
 }
 

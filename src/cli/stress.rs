@@ -14,7 +14,7 @@ use super::args::StressArgs;
 use super::document::{Column, Table};
 use super::shared_args::first_seed;
 use super::{Ending, interrupt, print, text};
-use crate::index::{Registry, StructureSpec};
+use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::report::grouped;
 use crate::stress::extremes::{self, Extremes, VerdictCounts};
@@ -59,9 +59,8 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let bar = ProgressBar::new(vector_passes + case_passes);
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
-            let mut execution = spec.execution;
-            execution.kernel = kernel;
-            spec.clone().by(execution)
+            let threads = spec.execution.threads;
+            spec.clone().by(Execution { kernel, threads })
         };
         let structures: Vec<StructureSpec> = structures.iter().map(by_kernel).collect();
         let mut found = Vec::new();

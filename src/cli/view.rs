@@ -311,12 +311,10 @@ impl Grid {
     /// The grid of a scene with this number of triangles.
     fn of(scene: &Scene, triangles: usize) -> Grid {
         let bounds = scene.world_bounds();
-        Grid {
-            // Few items may be far smaller than the scene.
-            steps: 1 << [20, 16][usize::from(scene.items.len() + triangles > 20_000)],
-            low: bounds.min - scene.origin,
-            extent: bounds.max - bounds.min,
-        }
+        // Few items may be far smaller than the scene.
+        let steps = 1 << [20, 16][usize::from(scene.items.len() + triangles > 20_000)];
+        let (low, extent) = (bounds.min - scene.origin, bounds.max - bounds.min);
+        Grid { steps, low, extent }
     }
 
     /// Position of a point in steps; nodes may reach beyond the items.
