@@ -196,7 +196,7 @@ impl Motion {
         }
     }
 
-    /// Warns or notes if frames and cameras differ in number and are not paired by their times.
+    /// Warns or notes if frames and cameras without times differ in number.
     pub(crate) fn tell_numbers(&self, path: &CameraPath, views: usize) {
         let (name, path_name, cameras) = (&self.name, &path.name, path.cameras.len());
         let views = views.max(1);
