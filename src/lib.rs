@@ -75,6 +75,9 @@
     forbid(unsafe_code)
 )]
 
+/// The vectors of this interface, in the version that it uses.
+pub use glam;
+
 #[macro_use]
 mod named;
 

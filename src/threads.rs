@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::thread::{Builder, scope};
 
 /// Most threads of a pool: the system may not create more.
 pub const MOST_THREADS: usize = 256;
@@ -42,8 +41,8 @@ impl Pool {
 /// A free thread takes the next job. With one thread, or one job, the jobs are done in order on
 /// this thread.
 ///
-/// If the system creates fewer threads, those do the work. Starting a thread takes about 20 to 50
-/// us: jobs pay from a fraction of a millisecond on.
+/// If the system cannot create them, this thread does the work. Starting a thread takes about 20 to
+/// 50 us: jobs pay from a fraction of a millisecond on.
 ///
 /// # Panics
 /// If a job panics.
@@ -53,18 +52,10 @@ pub fn share<J: Send>(
     work: impl Fn(J) + Sync,
 ) {
     let threads = jobs.size_hint().1.map_or(threads, |most| threads.min(most));
-    if threads <= 1 {
-        return jobs.for_each(work);
+    match (threads > 1).then(|| Workers::new(threads)) {
+        Some(Ok(workers)) => workers.share(jobs, work),
+        _ => jobs.for_each(work),
     }
-    let work_off = queue(jobs, work);
-    scope(|scope| {
-        for _ in 1..threads.min(MOST_THREADS) {
-            if Builder::new().spawn_scoped(scope, &work_off).is_err() {
-                break;
-            }
-        }
-        work_off();
-    });
 }
 
 /// Results of jobs in their order, done as [`share`] does them.
@@ -84,17 +75,6 @@ pub fn map<J: Send, R: Send>(
     });
     let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.into_values().collect()
-}
-
-/// The loop of a thread: does job after job until none is left.
-fn queue<J>(jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) -> impl Fn() + Sync {
-    let jobs = Mutex::new(jobs.fuse());
-    move || {
-        let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
-        while let Some(job) = next() {
-            work(job);
-        }
-    }
 }
 
 /// Threads that persist between queries; the calling thread is one of them.
@@ -121,7 +101,9 @@ impl Workers {
     /// If a job panics.
     pub fn share<J: Send>(&self, jobs: impl Iterator<Item = J> + Send, work: impl Fn(J) + Sync) {
         let most = jobs.size_hint().1.unwrap_or(usize::MAX);
-        let work_off = queue(jobs, work);
+        let jobs = Mutex::new(jobs.fuse());
+        let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let work_off = || std::iter::from_fn(next).for_each(&work);
         self.others.in_place_scope(|scope| {
             for _ in 1..self.threads.min(most) {
                 scope.spawn(|_| work_off());

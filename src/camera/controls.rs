@@ -125,6 +125,8 @@ impl Frame {
 impl Camera {
     /// Zooms by field of view: a factor of 2 halves the window's width.
     ///
+    /// The window's edges, and so the tangent of half the angle, are divided; not the angle.
+    ///
     /// # Errors
     /// A factor that is not above zero, or a lens that would have no window.
     pub fn zoom(&mut self, factor: f64) -> Result<()> {

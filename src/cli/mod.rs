@@ -174,7 +174,7 @@ fn start(program: Option<(&str, &str)>, registry: Registry) -> ExitCode {
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
             tell!("error: {}", without_repeats(&error));
-            ExitCode::from(2)
+            ExitCode::from(if error.is::<query::Panicked>() { 1 } else { 2 })
         }
     }
 }

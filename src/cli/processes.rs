@@ -94,12 +94,11 @@ impl Worker {
         let message = serde_json::from_slice(&line).map_err(|_| {
             let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
             let text = shortened(text.trim_end(), 60);
-            // A worker that has reported a step uses the same protocol.
+            // A worker that has reported a step uses the same protocol: a structure prints.
             let is_first = self.doing.1 == STARTING;
             let why = ["", ": the program is of another version"][usize::from(is_first)];
-            anyhow::anyhow!(
-                "a worker printed '{text}'; expected a message of protocol {PROTOCOL}{why}"
-            )
+            let who = self.doing.0.as_deref().unwrap_or("a worker");
+            anyhow::anyhow!("{who} printed '{text}'; expected messages of protocol {PROTOCOL}{why}")
         })?;
         match &message {
             Message::Ready { protocol } => ensure!(

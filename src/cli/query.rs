@@ -13,9 +13,9 @@ use super::args::{LocateArgs, QueryArgs};
 use super::shared_args::RowFormat;
 use super::{Ending, load_scene, unread_is_fine};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
+use crate::index::{BuildError, DynIndex, Registry, StructureSpec, caught};
 use crate::input::{is_readable, note, read_file, tell_warnings};
-use crate::measure::{Answer, Workload, guarded, input_of};
+use crate::measure::{Answer, Workload, input_of};
 use crate::motion::Motion;
 use crate::path::{self, read_points_csv};
 use crate::query::{ItemId, QueryCost};
@@ -170,6 +170,15 @@ impl Row {
     }
 }
 
+/// Panic of a structure at its build or a query: a wrong answer, no bad input.
+#[derive(Debug, thiserror::Error)]
+#[error("structure '{0}': panicked: {1}; expected an answer")]
+pub struct Panicked(String, String);
+
+fn panicked(spec: &StructureSpec, message: String) -> anyhow::Error {
+    Panicked(spec.label.clone(), message).into()
+}
+
 /// Bytes of answers in memory: enough that a structure is rarely built again.
 const HELD: usize = 64 << 20;
 
@@ -211,6 +220,7 @@ pub fn ask_all(
                     }
                     continue;
                 }
+                Err(BuildError::Panicked { message }) => return Err(panicked(spec, message)),
                 Err(error) => return Err(failed(error.to_string())),
             };
             // The first structure determines for how many queries the answers fit.
@@ -222,7 +232,7 @@ pub fn ask_all(
                 if first {
                     answers.extend((0..count).map(|_| Vec::with_capacity(structures.len())));
                 }
-                let asked = guarded(|| {
+                let asked = caught(|| {
                     let rows = answers[next - from..][..count].iter_mut().enumerate();
                     share(spec.execution.threads, rows, |(n, row)| {
                         let (mut out, mut cost) = (Vec::new(), QueryCost::default());
@@ -242,7 +252,7 @@ pub fn ask_all(
                         });
                     });
                 });
-                asked.map_err(|verdict| failed(verdict.reason.unwrap_or_default()))?;
+                asked.map_err(|message| panicked(spec, message))?;
                 let rows = answers[next - from..].iter().filter_map(|row| row.last());
                 held += rows.map(Row::bytes).sum::<usize>() * structures.len();
                 next += count;
@@ -444,10 +454,10 @@ mod tests {
     fn a_panic_is_one_line_and_a_refusal_leaves_the_others() {
         let linear = StructureSpec::parse("linear").expect("linear");
         let error = asked(&[linear.clone(), of(PANICS)], false).err();
-        let wanted = "structure 'panics': panicked: deep in a peer's code";
+        let wanted = "structure 'panics': panicked: deep in a peer's code; expected an answer";
         assert_eq!(error.as_deref(), Some(wanted));
         let error = asked(std::slice::from_ref(&linear), true).err();
-        let wanted = "structure 'linear': panicked: deep in a peer's query";
+        let wanted = "structure 'linear': panicked: deep in a peer's query; expected an answer";
         assert_eq!(error.as_deref(), Some(wanted));
         let answers = asked(&[of(REFUSES), linear], false).expect("linear answers");
         assert!(answers.len() == 2 && answers.iter().all(|a| a.structure == "linear"));

@@ -280,7 +280,7 @@ pub trait FrustumQuery: RegionIndex {
     /// Calls `each` with the id of every item that the volume sees.
     fn each_visible<Q: QueryVolume>(&self, volume: &Q, mut each: impl FnMut(ItemId)) {
         let _ = self.query_into(volume, &mut |ids: &[ItemId]| {
-            ids.iter().copied().for_each(&mut each);
+            each_of(ids, &mut each);
             ControlFlow::Continue(())
         });
     }
@@ -327,6 +327,17 @@ pub trait FrustumQuery: RegionIndex {
 }
 
 impl<T: RegionIndex> FrustumQuery for T {}
+
+/// Calls a function with each id of a slice.
+///
+/// `for_each` would become a call per id in another codegen unit; so would a loop in code of a
+/// larger instruction set.
+#[inline(never)]
+fn each_of(ids: &[ItemId], each: &mut impl FnMut(ItemId)) {
+    for &id in ids {
+        each(id);
+    }
+}
 
 /// One query with its arguments, for a [`Kernel`] to run.
 ///

@@ -234,7 +234,10 @@ mod tests {
         };
         assert_eq!(machine(Some(5.0), Some(64)).busy(), None);
         let told = machine(Some(40.0), Some(64)).busy().unwrap();
-        assert!(told.contains("of 64 cores, was already busy (load average 40.0)"), "{told}");
+        assert!(
+            told.contains("of 64 cores, was already busy (load average 40.0)"),
+            "{told}"
+        );
         // Older reports have the processors of the process alone.
         assert!(machine(Some(5.0), None).busy().is_some());
         let here = Machine::capture();

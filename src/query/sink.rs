@@ -9,12 +9,15 @@ use crate::kernel::{Append, Isa, LANES, LaneMask, Piece, extend, extend_from_ran
 ///
 /// A structure passes slices: a subtree that is wholly inside is one call.
 pub trait Sink {
+    /// False if positions suffice: ids are neither gathered nor read.
+    const READS_IDS: bool = true;
+
     /// Takes ids of answers, none of them twice in a query.
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()>;
 
     /// Takes the items `ids[places]`, by their positions in a structure's order.
     ///
-    /// Same as `accept(&ids[places])`, for sinks that do not need the ids.
+    /// Same as `accept(&ids[places])`, for sinks that do not need the ids ([`Sink::READS_IDS`]).
     #[inline(always)]
     fn accept_range<I: Isa>(
         &mut self,
@@ -44,21 +47,60 @@ pub trait Sink {
 
     /// Takes the answers of many blocks of items, in the order of the blocks.
     ///
-    /// `ids` has a row per block.
-    #[inline(always)]
+    /// `ids` has a row per block. The default gathers some hundred ids for each call of `accept`; when
+    /// `ids` has a row per block. The default gathers some hundred ids for each call of `accept`; after a
+    /// `Break` no further block is tested.
     fn accept_tested<I: Isa, T: Tests<I>>(
         &mut self,
         isa: I,
         ids: &[[ItemId; LANES]],
-        mut tests: T,
+        tests: T,
     ) -> ControlFlow<()> {
-        for i in 0..tests.count() {
-            let (block, lanes) = tests.test(isa, i);
-            self.accept_lanes(isa, ids.as_flattened(), block * LANES, lanes)?;
-        }
-        ControlFlow::Continue(())
+        let sink = self;
+        isa.run_outlined(Pass { sink, ids, tests })
     }
 }
+
+/// The answers of blocks, gathered and passed to a sink.
+struct Pass<'a, S: ?Sized, T> {
+    sink: &'a mut S,
+    ids: &'a [[ItemId; LANES]],
+    tests: T,
+}
+
+impl<I: Isa, S: Sink + ?Sized, T: Tests<I>> Piece<I> for Pass<'_, S, T> {
+    type Output = ControlFlow<()>;
+
+    #[inline(always)]
+    fn run(self, isa: I) -> ControlFlow<()> {
+        // By value: planes behind a reference would be read again for each block.
+        let mut tests = self.tests;
+        let (mut held, mut end) = ([0; HELD + LANES], 0);
+        for i in 0..tests.count() {
+            let (block, lanes) = tests.test(isa, i);
+            if !S::READS_IDS {
+                let ids = self.ids.as_flattened();
+                self.sink.accept_lanes(isa, ids, block * LANES, lanes)?;
+                continue;
+            }
+            if let Some(place) = held[end..].first_chunk_mut() {
+                isa.compress(place, isa.words(&self.ids[block]), lanes);
+            }
+            end += lanes.count_ones() as usize;
+            if end > HELD {
+                self.sink.accept(&held[..end])?;
+                end = 0;
+            }
+        }
+        match end {
+            0 => ControlFlow::Continue(()),
+            _ => self.sink.accept(&held[..end]),
+        }
+    }
+}
+
+/// Ids that are gathered before a call; those of one more block may come on top.
+const HELD: usize = 16 * LANES;
 
 /// Blocks of items, tested one by one when the sink requests it.
 pub trait Tests<I: Isa> {
@@ -221,6 +263,8 @@ impl<'a> Ranges<'a> {
 }
 
 impl Sink for Ranges<'_> {
+    const READS_IDS: bool = false;
+
     fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -246,9 +290,23 @@ impl Sink for Ranges<'_> {
 pub struct Count(pub u64);
 
 impl Sink for Count {
+    const READS_IDS: bool = false;
+
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self.0 += ids.len() as u64;
+        ControlFlow::Continue(())
+    }
+
+    #[inline(always)]
+    fn accept_lanes<I: Isa>(
+        &mut self,
+        _: I,
+        _: &[ItemId],
+        _: usize,
+        lanes: LaneMask,
+    ) -> ControlFlow<()> {
+        self.0 += u64::from(lanes.count_ones());
         ControlFlow::Continue(())
     }
 }
@@ -258,5 +316,107 @@ impl<F: FnMut(&[ItemId]) -> ControlFlow<()>> Sink for F {
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self(ids)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Aabb, ConvexVolume};
+    use crate::index::{Bvh, FrustumQuery, Input, Linear, Query, RegionIndex, Wide};
+    use crate::kernel::{Kernel, Plain};
+    use crate::query::NoRecorder;
+    use glam::Vec3;
+
+    fn every_form_has_the_same_ids<T: RegionIndex>(items: &[Aabb], volume: &ConvexVolume) {
+        let index = &T::build(&Input::new(items), &T::Params::default()).unwrap();
+        let list = index.visible(volume);
+        assert!(list.len() > 3 * HELD, "{}", list.len());
+        let mut one_by_one = Vec::new();
+        index.each_visible(volume, |id| one_by_one.push(id));
+        assert_eq!(one_by_one, list);
+        for kernel in Kernel::available() {
+            let recorder = &mut NoRecorder;
+            let mut list = Vec::new();
+            let sink = &mut list;
+            let _ = kernel.run(Query {
+                index,
+                volume,
+                sink,
+                recorder,
+            });
+            let mut count = Count::default();
+            let sink = &mut count;
+            let _ = kernel.run(Query {
+                index,
+                volume,
+                sink,
+                recorder,
+            });
+            assert_eq!(count.0, list.len() as u64, "{kernel}");
+            // The third call ends the query, or none.
+            for most in [usize::MAX, 3] {
+                let mut slices: Vec<Vec<ItemId>> = Vec::new();
+                let sink = &mut |ids: &[ItemId]| {
+                    slices.push(ids.to_vec());
+                    match slices.len() < most {
+                        true => ControlFlow::Continue(()),
+                        false => ControlFlow::Break(()),
+                    }
+                };
+                let flow = kernel.run(Query {
+                    index,
+                    volume,
+                    sink,
+                    recorder,
+                });
+                assert!(slices.iter().all(|ids| !ids.is_empty()), "{kernel}");
+                assert!(list.starts_with(&slices.concat()), "{kernel}");
+                match most {
+                    3 => assert!(flow.is_break() && slices.len() == 3, "{kernel}"),
+                    _ => assert_eq!(slices.concat(), list, "{kernel}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lists_counts_and_slices_have_the_same_ids() {
+        // Two of three are in view, so that blocks are partly full.
+        let at = |i: u16| Vec3::new(f32::from(i % 70), f32::from(i / 70), f32::from(i % 3) * 9.0);
+        let items: Vec<Aabb> = (0..5000).map(|i| Aabb::around(at(i), Vec3::ONE)).collect();
+        let region = Aabb::new(Vec3::splat(3.5), Vec3::new(60.0, 60.0, 20.0));
+        let volume = ConvexVolume::of_box(&region);
+        every_form_has_the_same_ids::<Linear>(&items, &volume);
+        every_form_has_the_same_ids::<Wide>(&items, &volume);
+        every_form_has_the_same_ids::<Bvh>(&items, &volume);
+    }
+
+    /// Blocks that are full; none may be tested after a buffer of them.
+    struct Full;
+
+    impl<I: Isa> Tests<I> for Full {
+        const SPARSE: bool = false;
+
+        fn count(&self) -> usize {
+            1000
+        }
+
+        fn test(&mut self, _: I, i: usize) -> (usize, LaneMask) {
+            assert!(i * LANES <= HELD, "tested after the end");
+            (i, LaneMask::MAX)
+        }
+    }
+
+    #[test]
+    fn a_break_leaves_at_most_one_buffer_of_tests_in_vain() {
+        let (ids, mut calls) = (vec![[7; LANES]; 1000], 0);
+        let mut sink = |ids: &[ItemId]| {
+            calls += 1;
+            assert!(ids.len() <= HELD + LANES);
+            ControlFlow::Break(())
+        };
+        let flow = sink.accept_tested(Plain, &ids, Full);
+        assert!(flow.is_break() && calls == 1);
     }
 }
