@@ -30,7 +30,7 @@ pub fn ibsp(bytes: &[u8]) {
     let index = read(structures[0].build(boxes));
     let graph = RegionGraph::of_quake(map);
     for place in &scene.places {
-        let sought = scene.sought(place.eye);
+        let sought = scene.search_point(place.eye);
         let wanted = scene.holding(&sought);
         let mut found = Vec::new();
         if let Some(index) = &index {

@@ -21,7 +21,7 @@ pub fn wad(bytes: &[u8]) {
         return;
     };
     for place in &scene.places {
-        assert_eq!(scene.holding(&scene.sought(place.eye)).len(), 1);
+        assert_eq!(scene.holding(&scene.search_point(place.eye)).len(), 1);
     }
     let map = DoomMap::of_scene(&scene).expect("a map");
     if map.lines.len().max(map.sectors.len()) <= MOST {

@@ -175,10 +175,6 @@ impl Row {
 #[error("structure '{0}': panicked: {1}; expected an answer")]
 pub struct Panicked(String, String);
 
-fn panicked(spec: &StructureSpec, message: String) -> anyhow::Error {
-    Panicked(spec.label.clone(), message).into()
-}
-
 /// Bytes of answers in memory: enough that a structure is rarely built again.
 const HELD: usize = 64 << 20;
 
@@ -208,6 +204,7 @@ pub fn ask_all(
         let mut answers: Vec<Vec<Row>> = Vec::new();
         for spec in structures {
             let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
+            let panicked = |message| Panicked(spec.label.clone(), message);
             let build = || spec.build(input_of(scene, boxes));
             let index = match only.take().map_or_else(build, Ok) {
                 Ok(index) => index,
@@ -220,7 +217,7 @@ pub fn ask_all(
                     }
                     continue;
                 }
-                Err(BuildError::Panicked { message }) => return Err(panicked(spec, message)),
+                Err(BuildError::Panicked { message }) => return Err(panicked(message).into()),
                 Err(error) => return Err(failed(error.to_string())),
             };
             // The first structure determines for how many queries the answers fit.
@@ -252,7 +249,7 @@ pub fn ask_all(
                         });
                     });
                 });
-                asked.map_err(|message| panicked(spec, message))?;
+                asked.map_err(panicked)?;
                 let rows = answers[next - from..].iter().filter_map(|row| row.last());
                 held += rows.map(Row::bytes).sum::<usize>() * structures.len();
                 next += count;

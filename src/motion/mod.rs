@@ -169,7 +169,7 @@ impl Motion {
         let all = counted(count, "camera");
         if count < views {
             note(&format!(
-                "{name}: the {all} of '{path_name}' take turns in a frame of {views} views"
+                "{name}: a frame of {views} views repeats the {all} of '{path_name}'"
             ));
         } else if spare > 0 {
             note(&format!(
@@ -220,7 +220,9 @@ impl Motion {
             let what = format_args!("the last {} of {all} of '{path_name}'", cameras - seen);
             note(&format!("{frames}: {what} are not used"));
         } else if is_recorded && path.times.is_empty() && seen > cameras {
-            note(&format!("{frames}: the {all} of '{path_name}' take turns"));
+            note(&format!(
+                "{frames}, which repeat the {all} of '{path_name}'"
+            ));
         }
     }
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::path::read_cameras_csv;
 use crate::scene;
+use glam::DVec3;
 
 fn scene(source: &str) -> Scene {
     scene::load(source, &Default::default()).unwrap()
@@ -99,6 +100,29 @@ fn a_step_is_as_long_as_it_says() {
     };
     whole("drift", &scene);
     whole("traffic", &scene_of_cars());
+}
+
+/// The mean size and not the ulp that outward rounding makes of them.
+#[test]
+fn points_that_f32_rounds_move_as_others_do() {
+    let moved = |fraction: f64| {
+        let at = |n: usize| DVec3::new(n as f64 + fraction, (n % 7) as f64 + fraction, fraction);
+        let boxes: Vec<WorldBox> = (0..50).map(|n| WorldBox::new(at(n), at(n))).collect();
+        let scene = Scene::from_boxes("points", &boxes).unwrap();
+        let motion = Motion::load("drift:share=1,step=0.9,frames=20", &scene).unwrap();
+        let last = frames(&motion, &scene).pop().unwrap().1;
+        let far = last
+            .iter()
+            .zip(&scene.items)
+            .map(|(a, b)| a.centre().distance(b.centre()));
+        far.fold(0.0, f32::max)
+    };
+    let exact = moved(0.5);
+    assert!(
+        exact > 0.1 && (moved(0.1) - exact).abs() < 0.1 * exact,
+        "{exact} {}",
+        moved(0.1)
+    );
 }
 
 #[test]

@@ -146,14 +146,14 @@ pub(super) fn places(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>> {
         return Err(unfit("places", format_args!("scene {found}; {wanted}")));
     }
     let places = stage.scene.places.iter();
-    let mut poses: Vec<Pose> = places.map(|place| pose(stage, place)).collect();
+    let mut poses: Vec<Pose> = places.map(|place| pose(stage, place, None)).collect();
     if spec.text("frames").is_some() {
         thin(&mut poses, stage.count);
     }
     Ok(poses)
 }
 
-pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
+pub(super) fn pose(stage: &Stage, place: &CameraPlace, time_s: Option<f64>) -> Pose {
     let turned = |v| stage.scene.up.to_z_up(v);
     let view = place.view.map(|view| PlaceView {
         up: turned(view.up),
@@ -161,6 +161,7 @@ pub(super) fn pose(stage: &Stage, place: &CameraPlace) -> Pose {
     });
     Pose {
         view,
+        time_s,
         ..Pose::new(turned(place.eye), turned(place.forward))
     }
 }
@@ -185,10 +186,7 @@ pub(super) fn animation(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>> {
     }
     let times = even_times(animation.seconds, stage.count);
     let pose = |time: f64| match animation.at(time) {
-        Some(place) => Ok(Pose {
-            time_s: Some(time),
-            ..pose(stage, &place)
-        }),
+        Some(place) => Ok(pose(stage, &place, Some(time))),
         None => Err(unfit(format!(
             "no direction of view at {time} s; expected a transform with one"
         ))),

@@ -47,7 +47,6 @@ pub trait Sink {
 
     /// Takes the answers of many blocks of items, in the order of the blocks.
     ///
-    /// `ids` has a row per block. The default gathers some hundred ids for each call of `accept`; when
     /// `ids` has a row per block. The default gathers some hundred ids for each call of `accept`; after a
     /// `Break` no further block is tested.
     fn accept_tested<I: Isa, T: Tests<I>>(

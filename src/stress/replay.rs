@@ -124,8 +124,8 @@ impl Replay<'_> {
         let truth = oracle.as_ref().map(|oracle| results.visible_to(oracle));
         let listed = &vector.expected_visible_camera;
         let wanted = listed.clone().or(truth).unwrap_or_default();
-        let touches = vector.touch_camera.iter().flatten().next().is_some();
-        let sees_nothing = wanted.is_empty() && !touches && listed.is_some();
+        let mut touched = vector.touch_camera.iter().flatten();
+        let sees_nothing = wanted.is_empty() && listed.is_some() && touched.next().is_none();
         let cubes = self.build_all(&CullingTest::Sphere.items(results.items));
         for (test, name, _) in TESTS {
             let structures = match test {

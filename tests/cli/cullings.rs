@@ -192,6 +192,30 @@ fn a_run_has_a_cell_with_its_errors_for_every_test() {
     assert!(contents(&run) == before);
 }
 
+/// A point that six planes without a margin return, and another culling misses.
+#[test]
+fn verify_judges_every_test_and_arithmetic_against_the_cameras() {
+    let point = "10000020.978243487,10000046.952126395,9999991.555016268";
+    let boxes = format!("min_x,min_y,min_z,max_x,max_y,max_z\n{point},{point}\n");
+    let camera = "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z,up_x,up_y,up_z,fovy_deg,aspect,\
+                  near,far\n10000016.271550953,10000016.646299759,10000017.740588337,\
+                  -0.313282631480201,-0.2225254482401904,-1.486615913654193,-1.4807502450553403,\
+                  1.2954806965326675,-0.5096205434010808,81.59953724585176,1.7875602052130715,1,20\n";
+    let here = folder(&[("p.csv", boxes.as_bytes()), ("c.csv", camera.as_bytes())]);
+    let what = "verify --scene p.csv --path c.csv --structure linear";
+    assert_eq!(cullbench(here.path(), what).code, Some(0));
+    let bare = cullbench(here.path(), &format!("{what} --epsilon 0"));
+    assert_eq!(bare.code, Some(1), "{}", bare.out);
+    let is_other = bare
+        .out
+        .contains(" volume, camera level: missed 1 visible item");
+    assert!(
+        is_other && !bare.out.contains("six-plane f32 volume"),
+        "{}",
+        bare.out
+    );
+}
+
 /// Every structure agrees, and all of them miss what the camera sees.
 #[test]
 fn answers_that_are_wrong_at_camera_level_are_unsafe() {

@@ -153,7 +153,7 @@ fn times_and_cameras_that_are_not_used_are_said() {
     for (path, wanted) in [
         (
             "one",
-            "the 1 camera of 'one.csv' take turns in a frame of 2 views",
+            "a frame of 2 views repeats the 1 camera of 'one.csv'",
         ),
         (
             "all",
@@ -187,6 +187,32 @@ fn times_and_cameras_that_are_not_used_are_said() {
     let run = cullbench(
         folder.path(),
         "run --plan --scene city:n=20 --path orbit:frames=9 --motion drift:frames=2 --views 3",
+    );
+    for (path, wanted) in [
+        (
+            "orbit:frames=1",
+            "its frames have 2 views, which repeat the 1 camera of 'orbit:frames=1'",
+        ),
+        (
+            "orbit:frames=5",
+            "its frames have 2 views: the last 3 of 5 cameras of 'orbit:frames=5' are not used",
+        ),
+    ] {
+        let planned = cullbench(
+            folder.path(),
+            &format!("run --plan {frames} --views 2 --path {path}"),
+        );
+        assert!(unwrapped(&planned.err).contains(wanted), "{}", planned.err);
+    }
+    let line = "run --plan --scene city:n=20 --path orbit:frames=9 --motion drift:frames=2";
+    let never = cullbench(
+        folder.path(),
+        &format!("{line} --structure wide --update refit,every=3"),
+    );
+    assert!(
+        never.err.contains("wide@every=3: no build in 2 frames"),
+        "{}",
+        never.err
     );
     let wanted = "drift:frames=2: its frames have 6 views: the last 3 of 9 cameras of \
         'orbit:frames=9' are not used";

@@ -57,6 +57,7 @@ const REFIT_KEEPS_SIZES: Fault = 36;
 const LOSES_ONE_IF_ITEMS_COME: Fault = 37;
 const ACCEPTS_TOO_MANY: Fault = 38;
 const KEEPS_ABSENT_IF_ITEMS_COME: Fault = 39;
+const IDS_OF_16_BITS: Fault = 40;
 
 const CLAIMS_TO_REFIT: Fault = 21;
 const REFITS_UNDECLARED: Fault = 22;
@@ -224,6 +225,9 @@ impl<const CLAIMS: Claims> Toy<CLAIMS> {
 
     fn hand_over<S: Sink>(&self, places: Range<usize>, sink: &mut S) -> ControlFlow<()> {
         let ids = &self.ids[places];
+        if self.fault == IDS_OF_16_BITS {
+            return sink.accept(&Vec::from_iter(ids.iter().map(|&id| id & 0xffff)));
+        }
         let mut flow = sink.accept(ids);
         if self.fault == RETURNS_ONE_TWICE && ids.contains(&7) && flow.is_continue() {
             flow = sink.accept(&[7]);
@@ -452,6 +456,7 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         CELLS_PANICS: "declared_capabilities_are_true";
         REFIT_KEEPS_SIZES: "refit_equals_a_fresh_build";
         LOSES_ONE_IF_ITEMS_COME: "declared_capabilities_are_true";
+        IDS_OF_16_BITS: "reference_set_on_generated_scenes";
         KEEPS_ABSENT_IF_ITEMS_COME: "items_that_come_and_go_are_followed";
         ACCEPTS_TOO_MANY: "every_view_sees_what_the_scan_sees";
         ITEMS_ARE_TESTED_LIKE_NODES: "every_view_sees_what_the_scan_sees";

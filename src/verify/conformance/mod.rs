@@ -18,7 +18,7 @@ use crate::scene::SeededRng;
 
 use queries::{
     Outcome, QuerySet, build, build_from, cases, each, edges, ensure, generated_scenes, ids_of,
-    is_right, points, query, sorted,
+    is_right, large_scene, points, query, sorted,
 };
 
 pub use behaviour::{
@@ -108,9 +108,10 @@ pub fn reference_set_on_random_cases<T: RegionIndex>() -> Outcome {
     })
 }
 
-/// Checks `visible` on small generated worlds, with cameras.
+/// Checks `visible` on small generated worlds, with cameras, and on a large grid.
 pub fn reference_set_on_generated_scenes<T: RegionIndex>() -> Outcome {
-    each(generated_scenes(1500)?, |queries, index: &mut T| {
+    let scenes = generated_scenes(1500)?.into_iter().chain([large_scene()]);
+    each(scenes, |queries, index: &mut T| {
         queries.visible_is_right(index)
     })
 }

@@ -229,6 +229,20 @@ pub(super) fn generated_scenes(n: usize) -> Result<Vec<QuerySet>, String> {
     scene::FAMILIES.iter().map(load).collect()
 }
 
+/// More items than 16 bits number, of which a query sees some of the last.
+pub(super) fn large_scene() -> QuerySet {
+    let at = |n: u32| Vec3::new((n % 256) as f32, (n / 256) as f32, 0.0);
+    let corner = Aabb::around(Vec3::new(256.0, 256.0, 0.0), Vec3::splat(9.0));
+    QuerySet {
+        scene: "a grid of 66,000 boxes".to_owned(),
+        items: (0..66_000)
+            .map(|n| Aabb::around(at(n), Vec3::ONE))
+            .collect(),
+        volumes: vec![ConvexVolume::of_box(&corner)],
+        points: Vec::new(),
+    }
+}
+
 fn camera_volumes(scene: &scene::Scene) -> Result<Vec<ConvexVolume>, CameraError> {
     let centre = scene.origin + scene.bounds.centre().as_dvec3();
     let radius = scene.bounds.extent().as_dvec3().length() / 2.0;
