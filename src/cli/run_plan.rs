@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::args::RunArgs;
 use super::shared_args::{WhatArgs, each_once};
 use crate::culling::Culling;
-use crate::index::{Registry, UpdatePolicy};
+use crate::index::Registry;
 use crate::input::{InputError, is_readable, names_file, note, tell_warnings};
 use crate::measure::{GroupKey, Part, Plan, PlannedScene};
 use crate::motion::Motion;
@@ -185,14 +185,6 @@ impl RunPlan {
                         let motion = motion.inspect(|own| own.tell_numbers(&path, views));
                         let workload = self.plan.workload(&scene, &path, culling, motion)?;
                         let Ok(workload) = workload else { continue };
-                        for spec in &self.plan.structures {
-                            let motion = workload.motion.as_ref();
-                            let frames = motion.map_or(usize::MAX, |motion| motion.frames);
-                            if matches!(spec.policy, UpdatePolicy::Every(n) if n as usize > frames)
-                            {
-                                note(&format!("{}: no build in {frames} frames", spec.label));
-                            }
-                        }
                         let moved = workload.motion.as_ref().map_or("", |own| &own.name);
                         let (what, name) = match moved {
                             "" => ("path", source.as_str()),
