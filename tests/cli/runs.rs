@@ -370,5 +370,8 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
     assert!(text.contains(wanted), "{text}");
     let (table, text) = run("near.csv", "before.csv", "three");
     assert!(!table.contains("by storage"), "{table}");
-    assert!(text.contains(", no false positives in 1 checked view\n"), "{text}");
+    assert!(
+        text.contains(", no false positives in 1 checked view\n"),
+        "{text}"
+    );
 }
