@@ -321,75 +321,7 @@ impl<F: FnMut(&[ItemId]) -> ControlFlow<()>> Sink for F {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Aabb, ConvexVolume};
-    use crate::index::{Bvh, FrustumQuery, Input, Linear, Query, RegionIndex, Wide};
-    use crate::kernel::{Kernel, Plain};
-    use crate::query::NoRecorder;
-    use glam::Vec3;
-
-    fn every_form_has_the_same_ids<T: RegionIndex>(items: &[Aabb], volume: &ConvexVolume) {
-        let index = &T::build(&Input::new(items), &T::Params::default()).unwrap();
-        let list = index.visible(volume);
-        assert!(list.len() > 3 * HELD, "{}", list.len());
-        let mut one_by_one = Vec::new();
-        index.each_visible(volume, |id| one_by_one.push(id));
-        assert_eq!(one_by_one, list);
-        for kernel in Kernel::available() {
-            let recorder = &mut NoRecorder;
-            let mut list = Vec::new();
-            let sink = &mut list;
-            let _ = kernel.run(Query {
-                index,
-                volume,
-                sink,
-                recorder,
-            });
-            let mut count = Count::default();
-            let sink = &mut count;
-            let _ = kernel.run(Query {
-                index,
-                volume,
-                sink,
-                recorder,
-            });
-            assert_eq!(count.0, list.len() as u64, "{kernel}");
-            // The third call ends the query, or none.
-            for most in [usize::MAX, 3] {
-                let mut slices: Vec<Vec<ItemId>> = Vec::new();
-                let sink = &mut |ids: &[ItemId]| {
-                    slices.push(ids.to_vec());
-                    match slices.len() < most {
-                        true => ControlFlow::Continue(()),
-                        false => ControlFlow::Break(()),
-                    }
-                };
-                let flow = kernel.run(Query {
-                    index,
-                    volume,
-                    sink,
-                    recorder,
-                });
-                assert!(slices.iter().all(|ids| !ids.is_empty()), "{kernel}");
-                assert!(list.starts_with(&slices.concat()), "{kernel}");
-                match most {
-                    3 => assert!(flow.is_break() && slices.len() == 3, "{kernel}"),
-                    _ => assert_eq!(slices.concat(), list, "{kernel}"),
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn lists_counts_and_slices_have_the_same_ids() {
-        // Two of three are in view, so that blocks are partly full.
-        let at = |i: u16| Vec3::new(f32::from(i % 70), f32::from(i / 70), f32::from(i % 3) * 9.0);
-        let items: Vec<Aabb> = (0..5000).map(|i| Aabb::around(at(i), Vec3::ONE)).collect();
-        let region = Aabb::new(Vec3::splat(3.5), Vec3::new(60.0, 60.0, 20.0));
-        let volume = ConvexVolume::of_box(&region);
-        every_form_has_the_same_ids::<Linear>(&items, &volume);
-        every_form_has_the_same_ids::<Wide>(&items, &volume);
-        every_form_has_the_same_ids::<Bvh>(&items, &volume);
-    }
+    use crate::kernel::Plain;
 
     /// Blocks that are full; none may be tested after a buffer of them.
     struct Full;

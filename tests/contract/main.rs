@@ -12,6 +12,7 @@ mod portable;
 mod ranges;
 mod road_sabotage;
 mod sabotage;
+mod sinks;
 mod stability;
 #[cfg(feature = "cli")]
 mod stress_sabotage;
