@@ -138,6 +138,7 @@ mishaps! {
     };
     Aborts "aborts" at_query std::process::abort();
     Panics "panics" at_query panic!("no such luck\nin two lines");
+    Prints "prints" at_query println!("hello there");
     PanicsChose "panics-chose" at_chose panic!("no choice");
     // As a Ctrl-C that falls into a build.
     Interrupts "interrupts" at_build {
@@ -234,6 +235,31 @@ fn each_mishap_fails_its_own_rows() {
             "{structure}"
         );
         assert_alone(&cells(folder.path(), "r"), structure, status, reason);
+    }
+}
+
+/// A panic is a wrong answer in every command; printed text is no message.
+fn structures_that_panic_or_print_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = "--scene city:n=20 --structure";
+    for (line, code, wanted) in [
+        (
+            format!("query {scene} panics --cameras orbit:frames=1"),
+            1,
+            "error: structure 'panics': panicked: no such luck in two lines; expected an answer\n",
+        ),
+        (
+            format!("run {scene} prints --path orbit:frames=1 --processes 1 --out r"),
+            2,
+            "prints printed 'hello there'; expected messages of protocol",
+        ),
+    ] {
+        let mut command = program(folder.path());
+        let done = command.args(line.split_whitespace()).output();
+        let done = done.expect("started");
+        let error = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(code), "{line}: {error}");
+        assert!(error.contains(wanted), "{line}: {error}");
     }
 }
 
@@ -438,6 +464,7 @@ fn main() -> ExitCode {
     a_scene_without_items_is_left_out();
     a_run_without_any_answer_is_no_success();
     each_mishap_fails_its_own_rows();
+    structures_that_panic_or_print_are_named();
     #[cfg(unix)]
     {
         a_limit_is_a_lack_of_memory();

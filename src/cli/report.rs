@@ -419,7 +419,7 @@ pub fn history(mut reports: Vec<Report>) -> String {
 
 /// Changes from first to last times, and other differences between these runs.
 ///
-/// Consecutive runs differ by the machine alone: no change is counted or named.
+/// Runs one after the other differ by their machines alone: no change is counted or named.
 fn conclusion(reports: &[Report], ratios: &[f64], others: usize) -> String {
     let end = |of: fn(f64, f64) -> f64| ratios.iter().copied().reduce(of);
     let ends = end(f64::min).zip(end(f64::max));

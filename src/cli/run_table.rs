@@ -87,13 +87,11 @@ pub fn heads(comparison: &Comparison) -> Vec<String> {
         None => sources.map(|items| format!("false positives {items}")),
         Some(share) => {
             let sources = text::some(sources, |items| format!(" ({items})"));
+            let rate = text::rate(Some(share), 1.0);
             let views = judged.map(|judged| text::counted(judged.judged_queries, "checked view"));
             Some(match (share.value == 0.0 && share.upper.is_none(), views) {
                 (true, Some(views)) => format!("no false positives in {views}"),
-                _ => format!(
-                    "{} % false positives{sources}",
-                    text::rate(Some(share), 1.0)
-                ),
+                _ => format!("{rate} % false positives{sources}"),
             })
         }
     };

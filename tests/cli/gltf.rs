@@ -81,10 +81,10 @@ fn a_note_tells_of_skins() {
 #[test]
 fn notes_tell_of_what_is_not_read_as_drawn() {
     let text = r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_odd", "KHR_materials_unlit"],
-        "scenes": [{"nodes": [0, 2]}, {"nodes": [3]}], "cameras": [{"type": "perspective",
+        "scenes": [{"nodes": [0, 2]}, {"nodes": [3, 4]}], "cameras": [{"type": "perspective",
         "perspective": {"yfov": 1, "znear": 1}}],
         "nodes": [{"extensions": {"KHR_node_visibility": {"visible": false}}, "children": [1]},
-            {"mesh": 0}, {"camera": 0, "scale": [0, 0, 0]}, {"mesh": 0}],
+            {"mesh": 0}, {"camera": 0, "scale": [0, 0, 0]}, {"mesh": 0}, {"camera": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}], "weights": [0, 1]}],
         "animations": [{"samplers": [{"input": 0, "output": 0}],
             "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}]}],
@@ -98,7 +98,7 @@ fn notes_tell_of_what_is_not_read_as_drawn() {
         "1 item hidden by KHR_node_visibility, read all the same",
         "1 camera without a direction of view, left out",
         "1 further scene not read",
-        "1 node with a mesh or a camera outside of the scene, not read",
+        "2 nodes with a mesh or a camera outside of the scene, not read",
         "extensions that it requires, not read: EXT_odd",
     ];
     assert_eq!(done.code, Some(0), "{}", done.err);

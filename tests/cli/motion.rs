@@ -172,6 +172,14 @@ fn times_and_cameras_that_are_not_used_are_said() {
         assert_eq!(done.code, Some(0), "{done:?}");
         assert!(unwrapped(&done.err).contains(wanted), "{}", done.err);
     }
+    let early =
+        format!("time_s,id,{BOUNDS}\n-2,0,0,0,0,1,1,2\n-1,0,0,0,0,1,1,3\n2,0,0,0,0,1,1,4\n");
+    fs::write(folder.path().join("early.csv"), early).expect("writable");
+    let line = "run --plan --scene scene.csv --path all.csv --motion early.csv";
+    let done = cullbench(folder.path(), line);
+    let wanted =
+        "2 of 3 moves come before the first frame of 'all.csv' and happen in it, all at once";
+    assert!(unwrapped(&done.err).contains(wanted), "{}", done.err);
     // Without times cameras see the frames of a run in turn, in a query all see one.
     fs::write(
         folder.path().join("still.csv"),

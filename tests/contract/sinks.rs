@@ -5,8 +5,24 @@ use std::ops::ControlFlow;
 use cullbench::geometry::{Aabb, ConvexVolume};
 use cullbench::index::{Bvh, FrustumQuery, Input, Linear, Query, RegionIndex, Wide};
 use cullbench::kernel::Kernel;
-use cullbench::query::{Count, ItemId, NoRecorder};
+use cullbench::query::{Count, ItemId, NoRecorder, Sink};
 use glam::Vec3;
+
+/// Answers a query with an instruction set.
+fn ask<S: Sink>(
+    kernel: Kernel,
+    index: &impl RegionIndex,
+    volume: &ConvexVolume,
+    sink: &mut S,
+) -> ControlFlow<()> {
+    let recorder = &mut NoRecorder;
+    kernel.run(Query {
+        index,
+        volume,
+        sink,
+        recorder,
+    })
+}
 
 fn every_form_has_the_same_ids<T: RegionIndex>(items: &[Aabb], volume: &ConvexVolume) {
     let index = &T::build(&Input::new(items), &T::Params::default()).unwrap();
@@ -16,40 +32,21 @@ fn every_form_has_the_same_ids<T: RegionIndex>(items: &[Aabb], volume: &ConvexVo
     index.each_visible(volume, |id| one_by_one.push(id));
     assert_eq!(one_by_one, list);
     for kernel in Kernel::available() {
-        let recorder = &mut NoRecorder;
-        let mut list = Vec::new();
-        let sink = &mut list;
-        let _ = kernel.run(Query {
-            index,
-            volume,
-            sink,
-            recorder,
-        });
-        let mut count = Count::default();
-        let sink = &mut count;
-        let _ = kernel.run(Query {
-            index,
-            volume,
-            sink,
-            recorder,
-        });
+        let (mut list, mut count) = (Vec::new(), Count::default());
+        assert!(ask(kernel, index, volume, &mut list).is_continue());
+        assert!(ask(kernel, index, volume, &mut count).is_continue());
         assert_eq!(count.0, list.len() as u64, "{kernel}");
         // The third call ends the query, or none.
         for most in [usize::MAX, 3] {
             let mut slices: Vec<Vec<ItemId>> = Vec::new();
-            let sink = &mut |ids: &[ItemId]| {
+            let mut sink = |ids: &[ItemId]| {
                 slices.push(ids.to_vec());
                 match slices.len() < most {
                     true => ControlFlow::Continue(()),
                     false => ControlFlow::Break(()),
                 }
             };
-            let flow = kernel.run(Query {
-                index,
-                volume,
-                sink,
-                recorder,
-            });
+            let flow = ask(kernel, index, volume, &mut sink);
             assert!(slices.iter().all(|ids| !ids.is_empty()), "{kernel}");
             assert!(list.starts_with(&slices.concat()), "{kernel}");
             match most {

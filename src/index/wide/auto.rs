@@ -27,7 +27,7 @@ const UPDATES: [&str; 4] = ["scan of overwritten boxes", "refit", "rebuild", "tw
 const OVERWRITE: usize = 0;
 const REFIT: usize = 1;
 const REBUILD: usize = 2;
-const TWO_TREES: usize = 3;
+const MOVING: usize = 3;
 
 // Times in ns, measured on one processor (AVX-512). Choices depend only on their ratios.
 /// A query without its tests, by search.
@@ -43,7 +43,7 @@ const MOVE_NS: [f64; 2] = [4.0, 8.0];
 /// A refit, and each leaf whose bounds it recomputes.
 const REFIT_NS: [f64; 2] = [100.0, 10.0];
 /// A refit of the two trees, per moved item that jumps.
-const TWO_TREES_NS: f64 = 250.0;
+const MOVING_NS: f64 = 250.0;
 /// Time of a query of two trees / of one in a new tree, until it is counted.
 const TWO: f64 = 2.0;
 /// An item of a build.
@@ -213,14 +213,14 @@ impl Auto {
         let (order, spheres) = (self.params.order, self.trees.still.balls.is_some());
         let input = Input::new(items).spheres(spheres);
         // Two trees hold new items without reserved lanes.
-        let input = input.come_and_go(self.update != TWO_TREES);
+        let input = input.come_and_go(self.update != MOVING);
         let Ok(trees) = Moving::resting(&input, &WideParams { order }) else {
             return false;
         };
         self.trees = trees;
-        self.two_trees = self.update == TWO_TREES;
+        self.two_trees = self.update == MOVING;
         self.scan = self.built_scan(items);
-        if matches!(self.update, REFIT | TWO_TREES) {
+        if matches!(self.update, REFIT | MOVING) {
             let new = self.count(items);
             self.costs[TREE] = new;
             self.aged[usize::from(self.two_trees)] = if self.two_trees { TWO * new } else { new };
@@ -327,9 +327,9 @@ impl Auto {
         let before = self.updates.iter().sum::<u32>();
         let updates = f64::from(std::mem::take(&mut self.weighing));
         let moved = std::mem::take(&mut self.moved);
-        let queries = f64::from(std::mem::take(self.queries.get_mut()));
+        let own = f64::from(std::mem::take(self.queries.get_mut()));
         // Queries before the first update belong to no frame.
-        let queries = [queries.max(updates), 1.0][usize::from(before == 0)];
+        let queries = if before == 0 { 1.0 } else { own.max(updates) };
         let (all, leaves) = (items.len() as f64, self.trees.still.occupied.len() as f64);
         // Approximate number of leaves that hold them, if items move anywhere.
         let fitted = moved * leaves / (moved / updates).hypot(leaves);
@@ -344,7 +344,7 @@ impl Auto {
             overwritten + queries * self.costs[SCAN],
             taken + REFIT_NS[0] * updates + fit + queries * self.aged[0],
             BUILD_NS * all * updates + queries * self.costs[self.built],
-            taken + REFIT_NS[0] * updates + TWO_TREES_NS * moved + queries * self.aged[1],
+            taken + REFIT_NS[0] * updates + MOVING_NS * moved + queries * self.aged[1],
         ];
         for (spent, cost) in self.spent.iter_mut().zip(costs) {
             *spent += cost;
@@ -352,14 +352,13 @@ impl Auto {
         let best = match (self.params.update, self.params.structure) {
             (Update::Rebuild, _) => REBUILD,
             (_, Use::Linear) => OVERWRITE,
-            (_, Use::Moving) => TWO_TREES,
+            (_, Use::Moving) => MOVING,
             (Update::Refit, _) => REFIT.min(self.built),
             (_, Use::Wide) => REFIT,
             _ if before == 0 => REFIT.min(self.built),
             _ => (0..4).fold(0, |best, i| if costs[i] < costs[best] { i } else { best }),
         };
-        let is_new =
-            (best == TWO_TREES) != self.two_trees || scans && best == REFIT && self.is_aged();
+        let is_new = (best == MOVING) != self.two_trees || scans && best == REFIT && self.is_aged();
         // A build; a switch between scan and tree; or a switch that keeps the tree.
         let change = match (is_new, best == OVERWRITE || scans) {
             (true, _) => BUILD_NS * all,
@@ -468,7 +467,7 @@ impl RegionIndex for Auto {
         }
         match self.update {
             REBUILD => self.rebuild(items),
-            kind if (kind == TWO_TREES) != self.two_trees => self.rebuild(items),
+            kind if (kind == MOVING) != self.two_trees => self.rebuild(items),
             OVERWRITE => self.overwrite(items, moved),
             _ => self.refit_trees(items, moved),
         }

@@ -115,6 +115,20 @@ fn a_touch_that_is_declared_and_not_visible_fails() {
     assert_eq!(touches("[]"), ["v/b"]);
 }
 
+/// A camera that cannot be made sees nothing and touches nothing.
+#[test]
+fn a_touch_of_a_refused_camera_fails() {
+    let refused = |touched: &str| {
+        failed(&format!(
+            r#"[{{"id":"v","camera":{{"eye":[0,0,0],"look":[0,0,-1],"up":[0,1,0],"fovy_deg":90,
+            "aspect":1,"near":8,"far":4}},"boxes":[{{"id":"b","lo":[-1,-1,-6],"hi":[1,1,-3]}}],
+            "expected_visible_camera":[],"touch_camera":{touched}}}]"#
+        ))
+    };
+    assert!(refused("[]").is_empty());
+    assert!(!refused(r#"["b"]"#).is_empty());
+}
+
 #[test]
 fn boxes_that_are_declared_empty_are_inverted() {
     let text = r#"[{"id":"v","boxes":[{"id":"b","lo":[0,0,0],"hi":[1,1,1]},

@@ -104,8 +104,8 @@ fn answers_are_right_through_every_change_of_kind() {
     let mut items = cubes(&mut rng, 5200);
     let mut index = built(&items, "");
     index.updates[REFIT] = 2;
-    let some = [OVERWRITE, OVERWRITE, REFIT, OVERWRITE, TWO_TREES, TWO_TREES];
-    let others = [REFIT, TWO_TREES, OVERWRITE, OVERWRITE, REBUILD, OVERWRITE];
+    let some = [OVERWRITE, OVERWRITE, REFIT, OVERWRITE, MOVING, MOVING];
+    let others = [REFIT, MOVING, OVERWRITE, OVERWRITE, REBUILD, OVERWRITE];
     for (round, kind) in some.into_iter().chain(others).enumerate() {
         (index.update, index.weighing) = (kind, 0);
         // Some twice, in no order; a quarter disappears or stays away.
@@ -120,7 +120,7 @@ fn answers_are_right_through_every_change_of_kind() {
         assert_right(&index, &items, &mut rng, &told);
         assert!(index.refit(&items, &[]));
         assert_right(&index, &items, &mut rng, &told);
-        assert_eq!(index.two_trees, kind == TWO_TREES, "{told}");
+        assert_eq!(index.two_trees, kind == MOVING, "{told}");
     }
     assert!(index.scan.is_some() && index.updates.iter().all(|&count| count > 0));
 }
